@@ -16,7 +16,7 @@ declare global {
 
 /** What of the viewer is nobody else's business. */
 interface Inside {
-  compile(scene: object): Promise<void>;
+  programs: { compile(scene: object): Promise<void> };
 }
 
 /** Requests for a path wait in `held` until each is let go; later ones go on when `open` is set. */
@@ -77,7 +77,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
   // While it is read, and while the card makes its programs.
   const kept = await page.evaluate(async () => {
     const { viewer } = window.viewer!;
-    const inside = viewer as unknown as Inside;
+    const { programs } = viewer as unknown as Inside;
     const glb = await (await fetch('/scene.glb')).arrayBuffer();
     const { note } = viewer.set!;
     const expect = (step: number) => viewer.layouts.expect({ ...note, layout: note.layout + 1000 + step })!;
@@ -85,12 +85,12 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     const reading = viewer.load(glb.slice(0), first);
     const second = expect(1);
     await reading;
-    const compile = inside.compile.bind(viewer);
+    const compile = programs.compile.bind(programs);
     let begun = () => {};
     let release = () => {};
     const compiling = new Promise<void>((resolve) => (begun = resolve));
     const released = new Promise<void>((resolve) => (release = resolve));
-    inside.compile = async (scene) => {
+    programs.compile = async (scene) => {
       await compile(scene);
       begun();
       await released;
@@ -100,7 +100,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     const third = expect(2);
     release();
     await loading;
-    delete (inside as Partial<Inside>).compile;
+    delete (programs as Partial<Inside['programs']>).compile;
     return { staged: viewer.layouts.stagedScene !== undefined, third: viewer.set === third };
   });
   expect(kept).toEqual({ staged: false, third: true });

@@ -1,5 +1,5 @@
-// How brightly the picture is shown: when its exposure, and the range of its false colours, are found anew, and of what.
-// Rests between measurements, as the card is needed for the picture itself.
+// Decides when the exposure of the picture and the range of its false colours are measured, and from what. Rests between
+// measurements, as the picture itself needs the card.
 
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { ExposureMeter, exposureOf } from './exposure';
@@ -11,17 +11,17 @@ import type { SkyBackground } from '../scene/sky';
 import { shownLight, type ViewMode } from '../looks/view_modes';
 
 const MEASURE_EVERY_MS = 250;
-/** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
+/** A measurement waits for all that the card has to draw. The rest after it is so many times as long. */
 const MEASURE_SHARE = 8;
-/** A card that is busy with the first light takes long: what it told of half of that is not to stay for ten times as long. */
+/** Longest rest: a measurement of the first light takes long on a slow card, and is soon out of date. */
 const MOST_PAUSE_MS = 1500;
 
-/** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
+/** The dark end of the radiosity scale, as a part of the dark end of the irradiance scale. */
 const DARKEST = 0.1;
-/** What is left to shoot counts for nothing where it is less than this of what arrives at the bright end. */
+/** The dark end of the scale of unshot light, as a part of the bright end of the irradiance scale. */
 const LEAST_UNSHOT = 0.01;
 
-/** What is measured. */
+/** The picture that is measured. */
 export interface Picture {
   readonly renderer: WebGLRenderer;
   readonly uniforms: ViewUniforms;
@@ -30,11 +30,11 @@ export interface Picture {
   readonly camera: PerspectiveCamera;
   readonly background: SkyBackground;
   mode(): ViewMode | undefined;
-  /** Signs and handles are no part of the scene's light. */
+  /** Draws without signs and handles, which are no part of the scene's light. */
   withoutSigns<T>(draw: () => T): T;
-  /** To fetch something from it does not hold the page up for long: it is idle, or quick. */
+  /** The card is idle or quick, so that fetching a result from it does not hold the page up. */
   isCardQuiet(): boolean;
-  /** It is to be drawn as it is to be shown now. */
+  /** The exposure or the range has changed. */
   redraw(): void;
 }
 
@@ -42,30 +42,32 @@ export class Brightness {
   readonly exposure: ExposureMeter;
   /** The range of false colours follows the light. */
   autoRange = true;
-  /** There is a value to be measured by that range; else none that is known is more than nothing. */
+  /** False: no known value is above 0, so there is no range. */
   hasRange = true;
+  /** The scene that is shown took the place of another scene's light. */
+  replacesLight = false;
   private readonly gate = new LightGate();
-  /** Something has changed that the range, and the exposure, may depend on. */
+  /** The picture has changed since the range, or the exposure, was measured. */
   private rangeDue = true;
   private exposureDue = true;
   private lastRange = 0;
   private lastMeasure = 0;
-  /** The turn in which the exposure of the first light was found without a picture. */
+  /** The turn in which the exposure of the first light was computed without a picture. */
   private guessedAt = -1;
-  /** Irradiance at the dark and bright end of what was last known, lux. */
+  /** The last known range of irradiance, lux. */
   private lightRange: [number, number] | undefined;
 
   constructor(private readonly picture: Picture) {
     this.exposure = new ExposureMeter(picture.renderer, picture.uniforms, () => picture.isCardQuiet());
   }
 
-  /** The picture is another one. */
+  /** The picture has changed. */
   changed(): void {
     this.rangeDue = true;
     this.exposureDue = true;
   }
 
-  /** Another view: the light that it shows has an exposure of its own. */
+  /** Another view, whose light may have another exposure. */
   setMode(mode: ViewMode): void {
     this.exposure.setLight(shownLight(mode));
     if (this.exposure.unknown) this.guessOfPages();
@@ -73,34 +75,34 @@ export class Brightness {
     this.changed();
   }
 
-  /** Once for every turn of the page. `replaces`: what is shown took the place of another scene's light. */
-  turn(now: number, replaces: boolean): void {
-    this.gate.turn(now, this.picture.layouts.shown?.set.lit === true && this.exposure.unknown, replaces);
+  /** Once a turn of the page. */
+  turn(now: number): void {
+    this.gate.turn(now, this.picture.layouts.shown?.set.lit === true && this.exposure.unknown, this.replacesLight);
     this.measureRange(now);
     this.measureExposure(now);
   }
 
-  /** It is not known yet how brightly to show the light there is. */
+  /** Light must not be shown yet, as its exposure is unknown. */
   holdsLightBack(now: number): boolean {
     return this.gate.isClosed(now);
   }
 
-  /** The card shall have nothing else to do than to find that out; or the page had enough to do with that in this turn. */
+  /** Nothing is to be drawn, so that the measurement is soon there; or because it took the whole turn. */
   standsStill(now: number): boolean {
     return this.gate.standsStill(now) || this.guessedAt === now;
   }
 
-  /** Ends when the exposure is the one that the light there is now asks for. */
+  /** Ends when the exposure fits the light that is there now. */
   async settle(): Promise<void> {
-    // The first may have been on its way.
+    // The first measurement may have begun before the light came.
     for (let again = 0; again < 2 && this.picture.layouts.shown; ++again) await this.measureNow();
     this.exposure.settle();
     this.exposure.step(0);
   }
 
   /**
-   * Unshot light is shown by how bright the scene is: by a scale of its own the little that is left at the end would look
-   * like much. As long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last stays.
+   * The scale of unshot light is that of irradiance: on a scale of its own the little that is left at the end would look like
+   * much. While unshot light is streamed, no irradiance comes, so the last known range stays.
    */
   updateRange(): void {
     this.hasRange = true;
@@ -111,7 +113,7 @@ export class Brightness {
     const isOfLight = isUnshot || mode?.quantity === 'irradiance';
     const set = isOfLight ? layouts.shown?.set : layouts.shownData;
     const range = set?.range() ?? (isUnshot ? this.lightRange : undefined);
-    this.hasRange = range !== undefined || mode?.id === 'radiosity'; // of which lamps have some that nothing is lit by
+    this.hasRange = range !== undefined || mode?.id === 'radiosity'; // lamps have radiosity even if they light nothing
     if (!range) return;
     if (isOfLight) this.lightRange = range;
     const [low, high] = range;
@@ -119,7 +121,7 @@ export class Brightness {
     uniforms.all.falseRange.value.set(darkest, high);
   }
 
-  /** What changes during a pause is measured after it: the last tiles of a solve, too. */
+  /** Changes during a pause, as by the last tiles of a solve, are measured after it. */
   private measureRange(now: number): void {
     if (!this.rangeDue || now - this.lastRange < MEASURE_EVERY_MS) return;
     this.lastRange = now;
@@ -137,7 +139,7 @@ export class Brightness {
     const { covered, complete, waiting } = this.picture.layouts.shown?.set ?? {};
     if (!this.gate.mayMeasure(now, covered === true, complete === true && waiting === 0)) return;
     this.lastMeasure = now;
-    if (unknown && this.guessExposure(now)) return; // and the card has the first light itself to draw
+    if (unknown && this.guessExposure(now)) return; // so the card can draw the first light at once
     this.exposureDue = false;
     if (automatic) void this.measureNow().then(() => this.picture.redraw());
   }
@@ -158,7 +160,7 @@ export class Brightness {
     return true;
   }
 
-  /** Of light that arrives, what all pages hold tells nearly as much as what is seen of them. */
+  /** For light that arrives at surfaces, all pages tell nearly as much as the picture does. */
   private guessOfPages(): boolean {
     const guess = this.exposureOfPages();
     if (guess !== undefined) this.exposure.guess(guess);

@@ -1,12 +1,13 @@
-// Layouts of lightmaps: the one that is on the screen, the next, which gets its geometry and its light beside it, and the
-// pages of what is looked at besides irradiance. Knows when the next one's turn has come; who shows it is the viewer.
+// Layouts of lightmaps: the shown layout, the next layout, which collects its geometry and light in the background, and the
+// pages of the quantity that is shown besides irradiance. Decides when the next layout is ready; the viewer shows it.
 
 import type { WebGLRenderer } from 'three';
+import type { Gltf } from '../../document/gltf';
 import type { LightmapsNote } from '../../protocol/messages';
 import { LightmapSet } from '../light/lightmap_set';
 import type { LitScene } from './lit_scene';
 
-/** A new layout is shown when its light is this far, or after so long. */
+/** A new layout is shown when its error is below this, or after so long. */
 const READY_ERROR = 0.35;
 const READY_AFTER_MS = 900;
 
@@ -18,41 +19,43 @@ interface Staged {
 
 export class Layouts {
   shown: LitScene | undefined;
-  /** Pages of error or unshot light, where they are streamed, of the newest layout. */
+  /** Pages of another quantity (error, unshot light), of the newest layout; undefined: only irradiance is streamed. */
   dataSet: LightmapSet | undefined;
-  /** Those on the screen, of the layout that is shown: others would lie elsewhere on its surfaces. */
+  /** The same for the shown layout: pages of another layout would not fit its surfaces. */
   shownData: LightmapSet | undefined;
   private staged: Staged | undefined;
   private isKnown = true;
+  /** The scene's document as it is now. */
+  private document: Gltf = { asset: { version: '2.0' } };
 
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly used: (bytes: number) => void,
   ) {}
 
-  /** The set that tiles of irradiance belong to. */
+  /** The pages that tiles of irradiance belong to. */
   get set(): LightmapSet | undefined {
     return this.staged?.set ?? this.shown?.set;
   }
 
-  /** The set that tiles of a quantity belong to; undefined: nobody looks at it. */
+  /** The pages that tiles of a quantity belong to; undefined: the quantity is not shown. */
   setOf(quantity: string): LightmapSet | undefined {
     if (quantity === 'irradiance') return this.set;
     return this.dataSet?.quantity === quantity ? this.dataSet : undefined;
   }
 
-  /** Everything that has textures on the card. */
+  /** All pages that have textures on the card. */
   get sets(): LightmapSet[] {
     const all = [this.shown?.set, this.staged?.set, this.dataSet, this.shownData];
     return [...new Set(all.filter((set) => set !== undefined))];
   }
 
-  /** The geometry of the next layout, as soon as it is there. */
+  /** The geometry of the next layout; undefined: it has not come yet. */
   get stagedScene(): LitScene | undefined {
     return this.staged?.scene;
   }
 
-  /** Pages have a new layout. Returns the set whose geometry is to be fetched; undefined: it is the one that is there. */
+  /** The server tells of a layout. Returns its pages, whose geometry is to be fetched; undefined: it is no new layout. */
   expect(note: LightmapsNote): LightmapSet | undefined {
     if (this.isKnown && this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
     this.isKnown = true;
@@ -60,25 +63,37 @@ export class Layouts {
     const set = new LightmapSet(this.renderer, note, 'irradiance', this.used);
     this.staged = { set, since: performance.now() };
     if (this.dataSet !== this.shownData) this.dataSet?.dispose();
-    this.dataSet = undefined; // its tiles are not those of the new layout; what is on the screen stays there
+    this.dataSet = undefined; // its pages are of the old layout; those that are shown stay
     return set;
   }
 
-  /** The server may have started again: its next layout is new, whatever its number. */
+  /** The server may have restarted: its next layout is new, whatever its number. */
   forget(): void {
     this.isKnown = false;
   }
 
-  /** The geometry of this set is waited for: it was not overtaken. */
+  /** Whether the pages are of the next layout, and not of one that is overtaken. */
   awaits(set: LightmapSet): boolean {
     return this.staged?.set === set;
+  }
+
+  /** Puts edits onto the objects that are there: JSON pointers; none: all of the document. */
+  applyDocument(document: Gltf, pointers: string[]): void {
+    this.document = document;
+    this.shown?.applyPointers(document, pointers);
+    this.stagedScene?.applyPointers(document, pointers);
+  }
+
+  /** The document may have been edited since the scene's geometry was made. */
+  bringUpToDate(scene: LitScene): void {
+    scene.applyDocument(this.document);
   }
 
   stage(scene: LitScene, set: LightmapSet): void {
     this.staged = { set, scene, since: performance.now() };
   }
 
-  /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
+  /** The first layout is ready at once; a later one when its light has come, so that the picture does not go dark. */
   takeReady(now: number): LitScene | undefined {
     const { staged } = this;
     if (!staged?.scene) return undefined;
@@ -95,7 +110,7 @@ export class Layouts {
     this.staged = undefined;
   }
 
-  /** Pages for a quantity beside irradiance, or none. */
+  /** Makes pages for a quantity besides irradiance; undefined: for none. */
   setDataQuantity(quantity: string | undefined): void {
     if (this.dataSet?.quantity === quantity) return;
     if (this.dataSet !== this.shownData) this.dataSet?.dispose();
@@ -104,7 +119,7 @@ export class Layouts {
     this.bindData();
   }
 
-  /** Data of the layout that is shown; as long as they are only of the next, those there are of the quantity. */
+  /** Gives the surfaces their data pages. Until the next layout is shown, its new pages wait and the old ones stay. */
   bindData(): void {
     const { shown, dataSet, shownData: before } = this;
     if (dataSet?.note === shown?.set.note) this.shownData = dataSet;
