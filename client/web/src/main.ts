@@ -1,4 +1,4 @@
-// Starts the viewer, or says why it cannot.
+// Starts the viewer, or tells the user why it cannot start.
 
 import { App } from './app/app';
 import { h } from './page/dom';

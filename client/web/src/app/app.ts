@@ -1,5 +1,5 @@
-// Builds the viewer out of its parts and passes messages between them: from the server to the picture and the panels, and
-// from the user to the server. The parts know each other only through what each of them asks for. One for a page.
+// Builds the viewer out of its parts and passes messages between them: from the server to the picture and the panels,
+// and from the user to the server. The parts know each other only through what each of them asks for. One for a page.
 
 import { EditHistory } from '../editing/edit_history';
 import { EditSession } from '../editing/edit_session';

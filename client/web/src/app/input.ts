@@ -125,7 +125,9 @@ function done(_result: unknown): true {
   return true;
 }
 
-/** Delete and Backspace act in the picture and in the list of objects; elsewhere the user meant the control in focus. */
+/**
+ * Delete and Backspace act in the picture and in the list of objects; elsewhere the user meant the control in focus.
+ */
 function isAmongObjects(target: EventTarget | null): boolean {
   return target === document.body || (target instanceof Element && target.closest('canvas.view, .tree') !== null);
 }

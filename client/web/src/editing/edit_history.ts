@@ -8,7 +8,9 @@ import type { Notes } from '../ui/toast';
 
 /** Between two questions: a drag makes thirty revisions a second. */
 const ASK_EVERY_MS = 500;
-/** So many revisions are searched for the newest edit that is not taken back; where it is older, undo is offered unseen. */
+/**
+ * So many revisions are searched for the newest edit that is not taken back; where it is older, undo is offered unseen.
+ */
 const REVISIONS = 32;
 
 interface Offer {

@@ -49,8 +49,8 @@ export class TexelErrors {
 
   /**
    * Standard error of the texel's irradiance (lux, luminance); undefined: not known yet, or there is none. Asks the
-   * server when the error is unknown or older than the newest light: one call at a time, five a second at most. An answer
-   * counts only for its own texel and its own revision of the scene, until the next answer is here.
+   * server when the error is unknown or older than the newest light: one call at a time, five a second at most. An
+   * answer counts only for its own texel and its own revision of the scene, until the next answer is here.
    */
   errorAt(place: TexelPlace): number | undefined {
     const version = this.source.version();

@@ -301,7 +301,7 @@ export class ViewSession {
   private whyNothing(): string {
     const { shown, shownData } = this.host.picture.layouts;
     const set = this.mode.quantity === 'irradiance' ? shown?.set : shownData;
-    return set?.complete && set.waiting === 0 ? '0 everywhere: nothing to measure' : 'Nothing has come yet';
+    return set?.complete && set.waiting === 0 ? '0 everywhere: nothing to measure' : 'No data yet';
   }
 }
 

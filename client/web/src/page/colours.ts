@@ -4,7 +4,7 @@ export function luminance([r, g, b]: readonly [number, number, number]): number 
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
 
-/** "#rrggbb" of linear RGB and back; above 1 is cut off, the caller keeps strength apart. */
+/** Linear RGB to "#rrggbb". Values above 1 are cut off: callers keep the strength of light apart from its colour. */
 export function toHex(rgb: readonly number[]): string {
   const byte = (v: number) => {
     const c = Math.min(1, Math.max(0, v));

@@ -1,9 +1,9 @@
-// Elements in one expression, and the small parts that panels are made of.
+// Elements in one expression, the small parts that panels are made of, and what leaves the page: clipboard and files.
 
 type Child = Node | string | undefined | false;
 type Properties = Record<string, unknown>;
 
-/** Properties that begin with "on" listen; "class" and names with "-" are attributes; others are set as they are. */
+/** Properties that begin with "on" are listeners; "class", "for", "role" and names with "-" are attributes. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   properties: Properties = {},
@@ -21,7 +21,6 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** A button with a shown or spoken name. */
 export function button(label: string, onClick: () => void, properties: Properties = {}): HTMLButtonElement {
   return h('button', { type: 'button', onclick: onClick, ...properties }, label);
 }
@@ -71,6 +70,14 @@ export function pressed(element: HTMLElement, on: boolean): void {
   element.setAttribute('aria-pressed', String(on));
 }
 
+export function panel(...children: Child[]): HTMLElement {
+  return h('div', {}, ...children);
+}
+
+export function buttons(...children: Child[]): HTMLElement {
+  return h('div', { class: 'buttons' }, ...children);
+}
+
 export function section(title: string, ...children: Child[]): HTMLElement {
   return h('section', {}, h('h3', {}, title), ...children);
 }
@@ -112,7 +119,7 @@ export async function copyText(text: string): Promise<boolean> {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    // Pages without TLS have no clipboard; an old way still works there.
+    // Pages without TLS have no clipboard, but an older way still works there.
     const area = h('textarea', { value: text, class: 'offscreen' });
     document.body.append(area);
     area.select();

@@ -1,16 +1,16 @@
-// For what is told many times a second, and need not be shown as often: every change of a text is drawn by the card that
-// the picture waits for.
+// Limits how often something is shown that changes many times a second: the browser draws each change of a text with
+// the card that the picture needs.
 
-/** So often at most. */
+/** Least time between two showings. */
 const APART_MS = 250;
-/** What is told of in quick succession, as of a solve of a few hundredths, shows once. */
+/** Changes in quick succession, as in a solve of some hundredths of a second, show once. */
 const SETTLE_MS = 100;
 
 export class Spaced {
   private lastMs = -Infinity;
   private timer: ReturnType<typeof setTimeout> | undefined;
 
-  /** `act`: shows what is newest by then. */
+  /** `act` shows the newest state. */
   constructor(private readonly act: () => void) {}
 
   /** There is something to show. */

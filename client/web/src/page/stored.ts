@@ -1,5 +1,5 @@
-// What a browser keeps for the next visit, or for this tab, where it keeps anything: one that blocks cookies refuses with
-// an exception, which must not take the page with it.
+// Values that the browser keeps for the next visit or for this tab. A browser that blocks cookies throws an exception
+// instead, which must not end the page.
 
 type Shelf = 'local' | 'session';
 
@@ -19,6 +19,6 @@ export function store(key: string, value: string, of: Shelf = 'local'): void {
   try {
     shelf(of).setItem(key, value);
   } catch {
-    // Then it holds until the page is left.
+    // The value then holds until the page is closed.
   }
 }

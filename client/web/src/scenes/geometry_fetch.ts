@@ -2,12 +2,10 @@
 
 import { pause } from '../page/pause';
 import { pauseMs } from '../protocol/connection';
-import type { LightmapsNote } from '../protocol/messages';
+import { NO_CONTENT, type LightmapsNote } from '../protocol/messages';
 import type { Notes } from '../ui/toast';
 import type { LightmapSet } from '../view/light/lightmap_set';
 import type { Viewer } from '../view/viewer';
-
-const NO_CONTENT = 204;
 
 export class GeometryFetch {
   private running: AbortController | undefined;
@@ -19,8 +17,9 @@ export class GeometryFetch {
   ) {}
 
   /**
-   * Loads the geometry of a new layout and gives up that of the last. The light of a layout may arrive before its geometry
-   * and is not sent twice: therefore the fetch is repeated after a broken connection, as long as the layout is the newest.
+   * Loads the geometry of a new layout and gives up that of the last. The light of a layout may arrive before its
+   * geometry and is not sent twice: therefore the fetch is repeated after a broken connection, as long as the layout is
+   * the newest.
    */
   async load(note: LightmapsNote, set: LightmapSet): Promise<void> {
     this.running?.abort();

@@ -3,7 +3,9 @@
 import type { PastRevision, SceneHistory } from '../protocol/messages';
 import { shownName } from '../protocol/page_name';
 
-/** Revision of the scene that a server begins with. When nobody is known to have loaded it, it replaced nobody's work. */
+/**
+ * Revision of the scene that a server begins with. When nobody is known to have loaded it, it replaced nobody's work.
+ */
 const FIRST = 1;
 
 /** The server's name for a scene that was sent to it without one. */

@@ -9,7 +9,10 @@ import { ConnectionLost, RpcError } from '../protocol/rpc';
 import type { Notes } from '../ui/toast';
 import { loadNote, wasReplaced } from './load_note';
 
-/** A file that is on its way, the place that the user looked from before it, and whether the server was asked to load it. */
+/**
+ * A file that is on its way, the place that the user looked from before it, and whether the server was asked to load
+ * it.
+ */
 interface Upload<Placed> {
   abort: AbortController;
   placed: Placed;
@@ -37,7 +40,9 @@ export class SceneSession<Placed> {
     failed: (error) => this.onNone(error),
   });
   private upload: Upload<Placed> | undefined;
-  /** Revision of the newest scene. The server tells of a scene twice: with its first light, and when all of it is there. */
+  /**
+   * Revision of the newest scene. The server tells of a scene twice: with its first light, and when all of it is there.
+   */
   private newest = 0;
   /** Revision of the newest load that the user was told of, or that this page asked for. */
   private told = 0;

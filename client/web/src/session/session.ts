@@ -1,4 +1,5 @@
-// The page's session with the server. It opens the connection before the page is built, so that both take place at once.
+// The page's session with the server. It opens the connection before the page is built, so that both take place at
+// once.
 
 import { Connection, type ConnectionEvents, type Server } from '../protocol/connection';
 import type { Notes } from '../ui/toast';

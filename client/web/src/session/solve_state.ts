@@ -87,7 +87,9 @@ export class SolveState {
     return !isHere || streamed.waiting > 0;
   }
 
-  /** The picture stays. The banner says that there is no light, or that no more will come, for as long as that holds. */
+  /**
+   * The picture stays. The banner says that there is no light, or that no more will come, for as long as that holds.
+   */
   private showTrouble(progress: Progress, isOver: boolean): void {
     const trouble = hasScene(progress) ? this.troubleOf(progress, isOver) : undefined;
     if (trouble?.text === this.trouble) return;

@@ -1,7 +1,7 @@
-// The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
+// The panel "Share": a link to the view, the last edit as a command, and files to download.
 
 import { LONGEST_NAME } from '../protocol/page_name';
-import { button, checkbox, field, h, section } from '../page/dom';
+import { button, buttons, panel, checkbox, field, h, section } from '../page/dom';
 
 export type Download = 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot';
 
@@ -31,14 +31,10 @@ export class SharePanel {
       button('Copy as command', () => actions.copyEdit('command'), { disabled: true }),
       button('Copy JSON', () => actions.copyEdit('json'), { disabled: true }),
     ];
-    this.element = h(
-      'div',
-      {},
+    this.element = panel(
       section(
         'This view',
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Copy link', () => actions.copyLink()),
           button('Save picture', () => actions.download('png')),
         ),
@@ -52,12 +48,10 @@ export class SharePanel {
         ),
         h('p', { class: 'dim' }, 'Viewers who share their cameras see where the others look from.'),
       ),
-      section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
+      section('Last edit', this.edit, buttons(...this.copies)),
       section(
         'Download',
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Lit scene (.glb)', () => actions.download('glb'), { title: 'With lightmap coordinates' }),
           button('Baked scene (.glb)', () => actions.download('unlit'), { title: 'For any glTF viewer' }),
           button('Lightmaps (.exr)', () => actions.download('exr'), { title: 'Irradiance in lux, 32-bit float' }),
@@ -69,7 +63,7 @@ export class SharePanel {
   }
 
   private nameField({ name, setName }: SharePanelActions): HTMLElement {
-    const title = `Shown with what you do; without one that is “${name.unnamed}”`;
+    const title = `Others see it with your edits; without a name they see “${name.unnamed}”`;
     const input = h('input', {
       type: 'text',
       value: name.person,

@@ -1,5 +1,5 @@
-// The picture. It owns the WebGL context, the shown scene and the light on it, and draws only when something has changed.
-// Main thread.
+// The picture. It owns the WebGL context, the shown scene and the light on it, and draws only when something has
+// changed. Main thread.
 
 import {
   type Box3,
@@ -34,7 +34,9 @@ import { Screen } from './frames/screen';
 import { SkyBackground, skyOf } from './scene/sky';
 import type { ViewMode } from './looks/view_modes';
 
-/** Time for taking up tiles, of a frame of 16 ms. Longer frames get the same share, but less than a long task (50 ms). */
+/**
+ * Time for taking up tiles, of a frame of 16 ms. Longer frames get the same share, but less than a long task (50 ms).
+ */
 const TILE_BUDGET_MS = 5;
 const TILE_SHARE = 0.3;
 const MOST_TILE_MS = 20;

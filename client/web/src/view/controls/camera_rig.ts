@@ -1,4 +1,4 @@
-// Where one looks from: orbiting about a point, or walking in the first person, by mouse, touch and keyboard.
+// The camera. The user orbits about a point or walks in the first person, by mouse, touch and keyboard.
 
 import { Box3, Euler, MathUtils, PerspectiveCamera, Quaternion, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
@@ -14,16 +14,16 @@ const WALK_KEYS: Record<string, [number, number, number]> = {
   KeyQ: [0, -1, 0],
 };
 
-/** Room around what is framed. */
+/** Space around a framed box, as a factor. */
 const FRAME_MARGIN = 1.08;
-/** Degrees: in a room one is near to what one sees. */
+/** Degrees. Wider than usual, as walls of a room are near. */
 const ROOM_FOV = 65;
 
-/** Of a camera in a link, as of those that viewers share. */
+/** Farthest coordinate of a camera in a link; the same as for shared cameras. */
 const FARTHEST_M = 1e12;
-/** Of the distance from eye to target: of what lies there nobody sees it, a tenth of a pixel of a large screen. */
+/** Part of the distance to the target that nobody sees: a tenth of a pixel of a large screen. */
 const SAME_PICTURE = 3e-5;
-/** Behind the point, that numbers are written with. */
+/** Most decimals of a number. */
 const MOST_DIGITS = 100;
 
 export class CameraRig {
@@ -35,7 +35,7 @@ export class CameraRig {
   private readonly look = new Euler(0, 0, 0, 'YXZ');
   private active = true;
   private readonly drags = new Map<number, { x: number; y: number }>();
-  /** Vertical field of view that the camera was given, degrees; narrower screens see more above and below. */
+  /** Vertical field of view of a wide screen, degrees. Narrow screens see more above and below. */
   private fov = 45;
 
   constructor(
@@ -67,7 +67,7 @@ export class CameraRig {
     this.moved();
   }
 
-  /** Nothing moves the camera while something else is dragged (the gizmo), or where it shows nothing (pages). */
+  /** False: nothing moves the camera, because the user drags the gizmo, or looks at pages. */
   set enabled(enabled: boolean) {
     this.active = enabled;
     this.orbit.enabled = enabled && this.mode === 'orbit';
@@ -78,7 +78,7 @@ export class CameraRig {
 
   /** True: the key moves the camera. */
   key(event: KeyboardEvent, pressed: boolean): boolean {
-    // Let go of with Control held it is let go of all the same, and with Command held browsers do not tell of it.
+    // A key may be released while Control is held. While Command is held, browsers do not report releases.
     if (!pressed) this.down.delete(event.code);
     if (event.key === 'Meta') this.down.clear();
     if (!this.active || !(event.code in WALK_KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
@@ -87,7 +87,7 @@ export class CameraRig {
     return true;
   }
 
-  /** Arrow keys: turns about the target, or looks about. Radians. */
+  /** Turns about the target, or looks around. Radians. */
   turn(right: number, up: number): void {
     if (!this.active) return;
     if (this.mode === 'walk') {
@@ -114,7 +114,7 @@ export class CameraRig {
     this.moved();
   }
 
-  /** Moves on. True: still moving. */
+  /** Continues movements. True: the camera is still moving. */
   update(seconds: number): boolean {
     const moving = this.down.size > 0;
     if (moving) {
@@ -129,16 +129,16 @@ export class CameraRig {
     return moving;
   }
 
-  /** How large the scene is: sets speeds and depth range. */
+  /** The scene's size sets speeds and depth range. */
   setBounds(box: Box3): void {
     this.size = Math.max(box.getSize(new Vector3()).length(), 1e-6);
-    // Who is there already is not thrown out: somebody may have typed a position that is a million times too large.
+    // The camera keeps its distance, even if somebody has typed a position that is a million times too large.
     const distance = this.camera.position.distanceTo(this.target);
     this.orbit.minDistance = distance > 0 ? Math.min(this.size * 1e-3, distance) : this.size * 1e-3;
     this.orbit.maxDistance = Math.max(this.size * 20, distance);
   }
 
-  /** Looks at the middle of the box from as near as its corners let it. */
+  /** Looks at the middle of the box from as near as possible, with all corners in the picture. */
   frame(box: Box3): void {
     const center = box.getCenter(new Vector3());
     const back = this.camera.getWorldDirection(new Vector3()).negate();
@@ -158,7 +158,7 @@ export class CameraRig {
     this.moved();
   }
 
-  /** Takes a camera of the scene; its target is put where the middle of the scene lies along its view. */
+  /** Takes a camera of the scene. The target is ahead of it, as far away as the middle of the scene. */
   take(from: PerspectiveCamera, box: Box3): void {
     from.updateWorldMatrix(true, false);
     from.matrixWorld.decompose(this.camera.position, this.camera.quaternion, new Vector3());
@@ -180,14 +180,14 @@ export class CameraRig {
     this.moved();
   }
 
-  /** Looks about in a room. */
+  /** Looks around in a room. */
   stand(eye: Vector3, target: Vector3): void {
     this.fov = ROOM_FOV;
     this.resize(this.camera.aspect);
     this.lookFrom(eye, target);
   }
 
-  /** Looks at the scene from in front, a little above. */
+  /** Looks at the whole scene from in front and a little above. */
   overview(box: Box3): void {
     this.fov = 45;
     this.resize(this.camera.aspect);
@@ -203,11 +203,11 @@ export class CameraRig {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Eye and target, metres, in as few digits as show the same picture, however far from the origin that is. */
+  /** Eye and target in metres, in as few digits as show the same picture, however far from the origin. */
   get place(): { position: number[]; target: number[] } {
     const distance = this.camera.position.distanceTo(this.target) || this.size;
     const behindPoint = (step: number) => MathUtils.clamp(Math.ceil(-Math.log10(step)), 0, MOST_DIGITS);
-    // The target may lie far beyond what is looked at: five digits in any case.
+    // Five digits in any case, as the target may be far beyond what the user looks at.
     const digits = (v: number) => behindPoint(Math.min(distance * SAME_PICTURE, Math.abs(v) * 1e-5 || Infinity));
     const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toFixed(digits(v))));
     return { position: rounded(this.camera.position), target: rounded(this.target) };
@@ -221,7 +221,7 @@ export class CameraRig {
 
   fromText(text: string): boolean {
     const n = text.split(',').map(Number);
-    // From farther away there is no way back: distances overflow, and framing the scene needs a direction.
+    // From farther away the user could not return: distances overflow, and framing needs a direction.
     const isNear = n.slice(0, 6).every((v) => Math.abs(v) <= FARTHEST_M);
     if (n.length !== 8 || !isNear || !Number.isFinite(n[7]) || !(n[6]! > 1 && n[6]! < 170)) return false;
     this.camera.position.set(n[0]!, n[1]!, n[2]!);
@@ -255,7 +255,7 @@ export class CameraRig {
 
   private fitPlanes(): void {
     const far = this.camera.position.distanceTo(this.target) + this.size * 2;
-    // Where one thing lies a million times as far away as the others are large, these are to be seen all the same.
+    // A camera that is a million times as far away as the scene is large still has to see the scene.
     const distance = this.camera.position.distanceTo(this.target);
     const near = Math.max(Math.min(this.size * 2e-4, distance * 0.2), far * 1e-6);
     if (Math.abs(this.camera.far / far - 1) < 0.2 && Math.abs(this.camera.near / near - 1) < 0.2) return;
@@ -268,7 +268,7 @@ export class CameraRig {
     if (this.active && this.mode === 'walk') this.drags.set(event.pointerId, { x: event.clientX, y: event.clientY });
   }
 
-  /** One finger or button looks about, two walk. */
+  /** One finger or button looks around, two walk. */
   private drag(event: PointerEvent): void {
     const last = this.drags.get(event.pointerId);
     if (!last || this.mode !== 'walk') return;
@@ -292,7 +292,7 @@ export class CameraRig {
     this.walk(() => this.camera.quaternion.setFromEuler(this.look));
   }
 
-  /** In the first person. The target stays as far ahead as it was: links and others are told where one looks to. */
+  /** A step in the first person. The target stays as far ahead, for links and for other viewers. */
   private walk(step: () => void): void {
     const distance = this.camera.position.distanceTo(this.target);
     step();

@@ -1,9 +1,8 @@
-// Handles to move, turn and scale the selected object, and the lines that show which it is. The handles are in the middle
-// of the object, wherever its own origin may be: many scenes have all their origins in one corner.
+// Handles that move, turn and scale the selected object, and its outline. The handles are in the middle of the object,
+// as many scenes have the origins of all objects in one corner.
 
 import {
   Box3Helper,
-  type BufferGeometry,
   EdgesGeometry,
   LineBasicMaterial,
   LinearSRGBColorSpace,
@@ -19,16 +18,18 @@ import {
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Handle } from '../../document/gltf';
-import { LampMarker } from '../scene/lamp_marker';
-import { surfaceBox } from '../scene/object_box';
+import { surfaceBox, surfacesOf, trianglesOf } from '../scene/object_box';
 
 export type GizmoMode = Handle;
 
-/** Finding edges takes about a microsecond a triangle; larger objects show their box. */
+/** Finding edges takes about a microsecond a triangle; objects with more triangles show their box. */
 const MAX_EDGE_TRIANGLES = 30_000;
-/** One drag makes an object at most so many times larger or smaller, and never turns it inside out. */
+const MAX_EDGE_MESHES = 200;
+/** Edges at which faces meet at a smaller angle are not drawn. */
+const EDGE_DEGREES = 20;
+/** One drag makes an object at most so many times larger or smaller, and never mirrors it. */
 const MOST_SCALE = 100;
-/** The middle handle doubles the size in so many pixels to the right or upwards. */
+/** A drag of the middle handle by so many pixels, right or up, doubles the size. */
 const DOUBLING_PX = 100;
 
 interface GizmoEvents {
@@ -41,9 +42,9 @@ export class Gizmo {
   mode: GizmoMode = 'translate';
   private object: Object3D | undefined;
   private readonly pivot = new Object3D();
-  /** From the pivot to the object, when the handles were put there. */
+  /** From the pivot to the object, as of placePivot(). */
   private readonly fromPivot = new Matrix4();
-  /** Made when something is selected for the first time: a visitor does not wait for what few will use. */
+  /** Made at the first selection, as few visitors need it and none should wait for it. */
   private made: TransformControls | undefined;
   private readonly lines = new LineBasicMaterial({
     toneMapped: false,
@@ -53,10 +54,10 @@ export class Gizmo {
   });
   private visible = true;
   private outline: Object3D[] = [];
-  /** In pixels of the page; where it took hold, and where it is now. */
+  /** The pointer in pixels of the page: at the start of the drag, and now. */
   private readonly grabbed = new Vector2();
   private readonly pointer = new Vector2();
-  /** Where the object was when it was taken hold of, in its parent. */
+  /** Placement of the object at the start of the drag, in its parent. */
   private readonly before = new Object3D();
 
   constructor(
@@ -66,8 +67,7 @@ export class Gizmo {
     private readonly events: GizmoEvents,
   ) {
     this.lines.color.setRGB(1, 0.66, 0.16, LinearSRGBColorSpace);
-    // Handles lie where they were last drawn, which is some time ago where frames are slow: what is under the pointer
-    // is decided by where they are now.
+    // With slow frames the handles were last drawn some time ago; the pointer must meet them where they are now.
     const place = () => this.object && this.made?.getHelper().updateMatrixWorld(true);
     const locate = ({ clientX, clientY }: PointerEvent) => {
       place();
@@ -83,14 +83,14 @@ export class Gizmo {
     return this.made?.dragging ?? false;
   }
 
-  /** What is held follows the pointer; after cancel() it does not, though the button is still down. */
+  /** The object follows the pointer; after cancel() it does not, though the button is still down. */
   get moves(): boolean {
     return this.dragging && this.made?.axis !== null;
   }
 
   /**
-   * Puts the object back to where it was taken hold of. The drag goes on without it until the pointer is let go, so that
-   * what is left of it does not turn the camera. False: nothing is held.
+   * Puts the object back to the start of the drag. The drag itself goes on until the button is released, so that the
+   * rest of it does not turn the camera. False: nothing is dragged.
    */
   cancel(): boolean {
     if (!this.moves || !this.object) return false;
@@ -104,12 +104,12 @@ export class Gizmo {
     return true;
   }
 
-  /** The pointer is over a handle, or holds one. */
+  /** The pointer is over a handle, or drags one. */
   get busy(): boolean {
     return this.made !== undefined && (this.made.dragging || this.made.axis !== null);
   }
 
-  /** Where the handles are, in metres. */
+  /** Place of the handles, in metres. */
   get middle(): Vector3 {
     return this.pivot.position.clone();
   }
@@ -130,7 +130,7 @@ export class Gizmo {
     this.attach(this.object);
   }
 
-  /** The object was moved, by these handles or by someone else. */
+  /** These handles, or another viewer, have moved the object. */
   refresh(): void {
     if (!this.moves) this.placePivot();
     for (const line of this.outline) {
@@ -151,7 +151,7 @@ export class Gizmo {
     for (const line of this.outline) line.visible = visible;
   }
 
-  /** Handles that are not seen are not for the pointer either. */
+  /** Invisible handles must not react to the pointer. */
   private showHandles(): void {
     if (!this.made) return;
     this.made.getHelper().visible = this.visible && this.made.object !== undefined;
@@ -184,7 +184,7 @@ export class Gizmo {
     return controls;
   }
 
-  /** Frames take colours as they are: grey of light that three.js computed from the screen's would be nearly black. */
+  /** The viewer encodes no colours of helpers, so three.js's conversion of them to linear light is reversed. */
   private asOnScreen(controls: TransformControls): void {
     const materials = new Set<MeshBasicMaterial>();
     controls.getHelper().traverse((part) => {
@@ -201,7 +201,7 @@ export class Gizmo {
     this.before.scale.copy(scale);
   }
 
-  /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */
+  /** Puts the pivot into the middle of the object, and turns it alike, so that scaling does not skew the object. */
   private placePivot(): void {
     const { object, pivot } = this;
     if (!object) return;
@@ -216,8 +216,8 @@ export class Gizmo {
   }
 
   /**
-   * The controls divide by how far from the middle the pointer took hold, which for the handle in the middle is next to
-   * nothing: there the way that it has gone decides.
+   * The controls divide by the distance between pointer and middle at the start of the drag. For the middle handle that
+   * is nearly 0, so the pointer's way decides instead.
    */
   private limitScale(): void {
     const { scale } = this.pivot;
@@ -225,7 +225,7 @@ export class Gizmo {
       const { x, y } = this.pointer.clone().sub(this.grabbed);
       scale.setScalar(2 ** ((x - y) / DOUBLING_PX));
     }
-    // Never nothing, nor less: a drag over the middle ends at the least. What was taken hold of in the middle has no ratio.
+    // A drag across the middle ends at the least scale. A drag that began in the middle has no ratio.
     for (const axis of ['x', 'y', 'z'] as const) if (Number.isNaN(scale[axis])) scale[axis] = 1;
     scale.clampScalar(1 / MOST_SCALE, MOST_SCALE);
   }
@@ -239,19 +239,13 @@ export class Gizmo {
   }
 
   private makeOutline(object: Object3D): void {
-    let triangles = 0;
-    const meshes: Mesh[] = [];
-    object.traverse((child) => {
-      if (!(child instanceof Mesh) || child.parent instanceof LampMarker) return;
-      meshes.push(child);
-      const geometry = child.geometry as BufferGeometry;
-      triangles += (geometry.index?.count ?? geometry.getAttribute('position').count) / 3;
-    });
-    if (triangles > MAX_EDGE_TRIANGLES || meshes.length > 200) {
+    const meshes = surfacesOf(object);
+    const triangles = meshes.reduce((sum, { geometry }) => sum + trianglesOf(geometry), 0);
+    if (triangles > MAX_EDGE_TRIANGLES || meshes.length > MAX_EDGE_MESHES) {
       this.outline = [new Box3Helper(surfaceBox(object), this.lines.color)];
     } else {
       this.outline = meshes.map((mesh) => {
-        const line = new LineSegments(new EdgesGeometry(mesh.geometry as BufferGeometry, 20), this.lines);
+        const line = new LineSegments(new EdgesGeometry(mesh.geometry, EDGE_DEGREES), this.lines);
         line.matrixAutoUpdate = false;
         line.userData['of'] = mesh;
         line.renderOrder = 10;

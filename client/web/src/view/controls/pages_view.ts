@@ -1,4 +1,4 @@
-// The lightmap pages side by side, flat, to be panned and zoomed.
+// The view of the lightmap pages, side by side, which the user can pan and zoom.
 
 import { Box3, Mesh, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
@@ -12,7 +12,7 @@ import { readingAt, type Reading } from '../rays/picker';
 
 const GAP = 0.04;
 
-/** What a page tells of texels that are no surface's. */
+/** The reading of a texel that belongs to no surface. */
 const NOWHERE = {
   point: undefined,
   irradiance: undefined,
@@ -51,7 +51,7 @@ export class PagesView {
     this.controls.enabled = active;
   }
 
-  /** Lays the pages out in rows, as near to a square as whole numbers go. */
+  /** Lays the pages out in rows, in nearly a square. */
   show(set: LightmapSet | undefined): void {
     if (set === this.shownSet) return;
     for (const { mesh, material } of this.made) {
@@ -83,7 +83,7 @@ export class PagesView {
     this.controls.update();
   }
 
-  /** By so much of what is seen. */
+  /** Steps are parts of the picture's height. */
   pan(right: number, up: number): void {
     const { top, zoom, position } = this.camera;
     const step = new Vector3(right, up, 0).multiplyScalar((2 * top) / zoom);
@@ -107,8 +107,8 @@ export class PagesView {
   }
 
   /**
-   * The light of the texel that lies there, and whose surface that is; undefined: beside the pages. `x`, `y`: normalised
-   * device coordinates. `scene`: the one whose pages they are.
+   * The light and the surface of a texel; undefined: the place is beside the pages. `scene`: the scene of the pages.
+   * `x`, `y`: normalised device coordinates.
    */
   readAt(scene: LitScene, x: number, y: number): Reading | undefined {
     const at = new Vector3(x, y, 0).unproject(this.camera);
@@ -117,7 +117,7 @@ export class PagesView {
       const [u, v] = [(at.x - mesh.position.x) / width + 0.5, (at.y - mesh.position.y) / height + 0.5];
       if (u < 0 || u >= 1 || v < 0 || v >= 1) continue;
       const texel: [number, number] = [Math.floor(u * page.width), Math.floor(v * page.height)];
-      // The texel itself, as it is drawn: its neighbours may be of surfaces elsewhere.
+      // Without interpolation, as the texel's neighbours may belong to other surfaces.
       const middle = new Vector2((texel[0] + 0.5) / page.width, (texel[1] + 0.5) / page.height);
       const hit = surfaceAt(scene, page, new Vector2(u, v)) ?? surfaceAt(scene, page, middle);
       if (!hit) return { ...NOWHERE, page: index, texel };

@@ -1,5 +1,5 @@
-// Where the other viewers look from: a small pyramid for each, with its name beside it. Moves smoothly between the
-// places that come a few times a second. Main thread.
+// Shows where other viewers look from: a small pyramid for each, with a name beside it. The places come a few times a
+// second, and the pyramids move smoothly between them. Main thread.
 
 import {
   BufferGeometry,
@@ -19,14 +19,14 @@ import type { SharedCamera } from '../../protocol/messages';
 import { shownName } from '../../protocol/page_name';
 import { button, h } from '../../page/dom';
 
-/** Of the way that is left, gone in this time, seconds. */
+/** In this time, seconds, the rest of the way shrinks to 1/e. */
 const EASE_S = 0.12;
-/** Length of a pyramid, of how far away it is: who stands close by hides no more of the picture. */
+/** Greatest length of a pyramid as a part of its distance, so that a near one hides no more of the picture. */
 const MOST_OF_DISTANCE = 0.12;
-/** Hues far from each other, whoever comes next: steps of the golden angle, degrees. */
+/** Degrees between the hues of two viewers: steps of the golden angle keep any number of hues apart. */
 const HUE_STEP = 137.508;
 
-// The eye at the origin, the picture's corners ahead (+Z, as lookAt turns things that are no camera).
+// The eye is at the origin, and the corners of the picture are ahead: +Z, as lookAt() turns objects that are no camera.
 const CORNERS = [
   [-0.6, -0.4, 1],
   [0.6, -0.4, 1],
@@ -54,14 +54,14 @@ class Person extends Object3D {
   private readonly shownAim = new Vector3();
   private readonly side: MeshBasicMaterial;
   private readonly edge: LineBasicMaterial;
-  /** Of the pyramid from afar, metres. */
+  /** Length of the pyramid from afar, metres. */
   length = 0;
   private placed = false;
 
   constructor(camera: SharedCamera, visit: (eye: Vector3, target: Vector3) => void) {
     super();
     const hue = Math.round((camera.viewer * HUE_STEP) % 360);
-    // Nothing is encoded after the shader: the numbers are those of the screen, as the label's are.
+    // The viewer encodes no colours of helpers: the numbers are the screen's, as those of the label.
     const color = new Color().setHSL(hue / 360, 0.85, 0.6, LinearSRGBColorSpace);
     this.side = new MeshBasicMaterial({ color, transparent: true, opacity: 0.35, side: 2, depthWrite: false });
     this.edge = new LineBasicMaterial({ color });
@@ -83,7 +83,7 @@ class Person extends Object3D {
     this.shownAim.copy(this.aim);
   }
 
-  /** True: still on its way. `size`: length of the pyramid, metres, of one that is not close to `from`. */
+  /** True: still on its way. `size`: length of the pyramid in metres, unless it is close to `from`. */
   step(seconds: number, size: number, from: Vector3): boolean {
     const part = 1 - Math.exp(-seconds / EASE_S);
     const left = Math.max(this.position.distanceTo(this.eye), this.shownAim.distanceTo(this.aim));
@@ -105,18 +105,14 @@ class Person extends Object3D {
 }
 
 export class People {
-  /** Goes into the scene that is drawn, and is no part of what is lit. */
+  /** To be added to the drawn scene; no part of its light. */
   readonly root = new Group();
-  /** Names, over the picture. */
+  /** The names, to be laid over the picture. */
   readonly labels = h('div', { class: 'labels' });
   private readonly people = new Map<number, Person>();
   private readonly projected = new Vector3();
 
   constructor(private readonly visit: (eye: Vector3, target: Vector3) => void) {}
-
-  get count(): number {
-    return this.people.size;
-  }
 
   show(cameras: readonly SharedCamera[]): void {
     const there = new Set(cameras.map((camera) => camera.viewer));
@@ -137,20 +133,20 @@ export class People {
     }
   }
 
-  /** True: somebody is still on the way to where they are. */
+  /** True: some pyramids are still on their way. */
   step(seconds: number, size: number, from: Vector3): boolean {
     let moving = false;
     for (const person of this.people.values()) moving = person.step(seconds, size, from) || moving;
     return moving;
   }
 
-  /** Who is so near that the own eye is inside would only be in the way. */
+  /** Hides pyramids around the camera, which would only be in the way. */
   leaveOut(camera: PerspectiveCamera): void {
     for (const person of this.people.values())
       person.visible = person.position.distanceTo(camera.position) > 1.3 * person.length;
   }
 
-  /** Puts the names where the eyes are; who is behind or beside the picture has none. */
+  /** Puts the names at the eyes, except for viewers behind or beside the picture. */
   placeLabels(camera: PerspectiveCamera, width: number, height: number): void {
     for (const person of this.people.values()) {
       const { x, y, z } = this.projected.copy(person.position).project(camera);

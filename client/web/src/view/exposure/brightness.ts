@@ -1,5 +1,5 @@
-// Decides when the exposure of the picture and the range of its false colours are measured, and from what. Rests between
-// measurements, as the picture itself needs the card.
+// Decides when the exposure of the picture and the range of its false colours are measured, and from what. Rests
+// between measurements, as the picture itself needs the card.
 
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { ExposureMeter, exposureOf } from './exposure';
@@ -101,8 +101,8 @@ export class Brightness {
   }
 
   /**
-   * The scale of unshot light is that of irradiance: on a scale of its own the little that is left at the end would look like
-   * much. While unshot light is streamed, no irradiance comes, so the last known range stays.
+   * The scale of unshot light is that of irradiance: on a scale of its own the little that is left at the end would
+   * look like much. While unshot light is streamed, no irradiance comes, so the last known range stays.
    */
   updateRange(): void {
     this.hasRange = true;

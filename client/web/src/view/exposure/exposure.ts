@@ -1,5 +1,5 @@
-// How bright the picture is shown. Automatic: the lit part's logarithmic mean becomes middle grey, as the server does it
-// for its own pictures, from a small picture read back without waiting.
+// The exposure of the picture. Automatic exposure makes the logarithmic mean of the lit part middle grey, as the server
+// does in its own pictures. It measures a small picture, which it reads back without waiting.
 
 import {
   FloatType,
@@ -9,6 +9,7 @@ import {
   type Scene,
   type WebGLRenderer,
 } from 'three';
+import { luminance } from '../../page/colours';
 import { decodeHalf } from '../../protocol/rgb9e5';
 import type { ViewUniforms } from '../scene/lit_material';
 import { Readback } from './readback';
@@ -18,16 +19,17 @@ import type { ShownLight } from '../looks/view_modes';
 const WIDTH = 64;
 const HEIGHT = 48;
 const GREY = 0.18;
-/** Of what is typical: what is further off is a dark outside, or a lamp. */
+/** Pixels so many times darker or brighter than the typical one are a dark outside, or lamps, and do not count. */
 const RANGE = 24;
 /**
- * Pixels count by this power of their luminance. Lamps of 2,000 times the light of walls count 6.7 times as much, and are
- * not taken for what one looks at before they cover an eighth of the picture; a dark outside of a thousandth of a room's
- * light counts a sixth, and is not before it covers 85 %. By the square root lamps were from a fiftieth on.
+ * Pixels count by this power of their luminance. Lamps 2,000 times as bright as walls count 6.7 times as much, and are
+ * taken for the subject only if they cover an eighth of the picture; a dark outside with a thousandth of a room's light
+ * counts a sixth, and is the subject only if it covers 85 %. With the square root, a fiftieth of the picture was enough
+ * for lamps.
  */
 const WEIGHT = 0.25;
 
-/** The factor for a picture's luminances; undefined when nothing is lit. */
+/** The factor for a picture with these luminances; undefined: nothing is lit. */
 export function exposureOf(luminances: readonly number[]): number | undefined {
   const lit = luminances.filter((v) => v > 0 && Number.isFinite(v)).sort((a, b) => a - b);
   const half = lit.reduce((sum, v) => sum + v ** WEIGHT, 0) / 2;
@@ -40,22 +42,22 @@ export function exposureOf(luminances: readonly number[]): number | undefined {
 
 export class ExposureMeter {
   automatic = true;
-  /** Steps of two, added to what is measured, or to 1 where exposure is manual. */
+  /** Stops (steps of two) that the user adds to the measured or manual exposure. */
   stops = 0;
-  /** What a manual exposure starts from. */
+  /** The manual exposure, before `stops`. */
   base = 1;
-  /** How long the last measurement was on its way. */
+  /** How long the last measurement took. */
   tookMs = 0;
-  /** What was measured last of either light: who goes back to a view finds it as bright as it was. */
+  /** The last exposure of either kind of light, for a return to its view. */
   private readonly known = new Map<ShownLight, number>();
   private light: ShownLight = 'leaving';
   private measured = 1;
   private shown = 1;
-  /** The next value is taken at once: the eye need not get used to it. */
+  /** The next value is shown at once, without a transition. */
   private fresh = true;
-  /** Nothing has come back yet, be it that nothing is lit. */
+  /** No measurement has come back yet. */
   private waits = true;
-  /** Raised when what is measured at the moment is of no interest any more. */
+  /** Counts scenes and kinds of light: a measurement of an earlier one does not count. */
   private scene = 0;
   private running: Promise<void> | undefined;
   private readonly target: WebGLRenderTarget;
@@ -73,13 +75,13 @@ export class ExposureMeter {
     this.readback = new Readback(gl, this.half ? gl.HALF_FLOAT : gl.FLOAT, WIDTH, HEIGHT, isCardQuiet);
   }
 
-  /** Another scene, or another part of it: what was measured says nothing about it. */
+  /** The scene or the place in it is another, and earlier measurements do not count. */
   forget(): void {
     this.known.clear();
     this.renew();
   }
 
-  /** Light that leaves surfaces and light that reaches them differ by how dark the surfaces are: each has its own. */
+  /** Light that leaves surfaces and light that reaches them have different exposures. */
   setLight(light: ShownLight): void {
     if (light === this.light) return;
     this.light = light;
@@ -94,41 +96,41 @@ export class ExposureMeter {
     ++this.scene;
   }
 
-  /** Shown at once, until there is a measurement, which differs little: to go over to that takes frames for nothing. */
+  /** Shows a guess at once. The measurement that follows differs little, so it needs no transition either. */
   guess(value: number): void {
     this.take(value);
     this.waits = false;
     this.fresh = true;
   }
 
-  /** How brightly to show light is still to be found out. */
+  /** The exposure is still to be measured. */
   get unknown(): boolean {
     return this.automatic && this.waits;
   }
 
-  /** A measurement is to be fetched as soon as the card has nothing to draw: not where it is quick. */
+  /** A measurement waits to be fetched from a slow card, which must have nothing to draw for that. */
   get wantsQuiet(): boolean {
     return this.readback.arrived;
   }
 
-  /** The context is lost: what was on its way never comes. */
+  /** The context is lost, and running measurements with it. */
   forgetCard(): void {
     this.readback.forget();
   }
 
-  /** Moves what is shown towards what was measured. True: not there yet. */
+  /** Moves the shown exposure towards the measured one. True: it is not there yet. */
   step(seconds: number): boolean {
     const goal = (this.automatic ? this.measured : this.base) * 2 ** this.stops;
     const ratio = goal / this.shown;
     const close = Math.abs(Math.log2(ratio)) < 0.004;
     this.shown = close ? goal : this.shown * ratio ** Math.min(1, seconds * 7);
     this.view.all.toneMappingExposure.value = this.shown;
-    // Surfaces of which nothing is known yet show as a bright grey.
+    // Surfaces without light are a bright grey.
     this.view.all.previewLight.value = (Math.PI * 0.6) / this.shown;
     return !close;
   }
 
-  /** The next step goes all the way. */
+  /** Ends the transition. */
   settle(): void {
     this.shown = (this.automatic ? this.measured : this.base) * 2 ** this.stops;
   }
@@ -137,19 +139,19 @@ export class ExposureMeter {
     return this.shown;
   }
 
-  /** Of light that leaves surfaces, whatever is shown. */
+  /** The exposure of light that leaves surfaces, whichever light is shown. */
   get ofLeaving(): number {
     const known = this.automatic ? this.known.get('leaving') : undefined;
     return known === undefined ? this.shown : known * 2 ** this.stops;
   }
 
-  /** Was found out without a picture. */
+  /** The exposure was computed without a picture. */
   found(value: number): void {
     this.take(value);
     this.waits = false;
   }
 
-  /** Ends when there is a new value; the one that is on its way counts. */
+  /** Ends when there is a new value; a running measurement counts. */
   measure(scene: Scene, camera: PerspectiveCamera, sky: SkyBackground): Promise<void> {
     if (this.running) return this.running;
     const running = this.read(scene, camera, sky).finally(() => {
@@ -175,11 +177,11 @@ export class ExposureMeter {
       await reading;
       this.tookMs = performance.now() - begin;
       if (of !== this.scene) return;
-      // A sky behind a small window is brighter than all of the room: it counts where nothing else has light.
+      // The sky counts only if nothing else is lit: behind a small window it is brighter than all of the room.
       const value = exposureOf(this.luminances(pixels)) ?? (this.light === 'leaving' ? ofSky(sky, from) : undefined);
       if (value !== undefined) this.take(value);
     } catch {
-      return; // The context was lost on the way; it is measured again when it is back.
+      return; // the context was lost; the exposure is measured again when it is back
     }
     if (of === this.scene) this.waits = false;
   }
@@ -195,14 +197,14 @@ export class ExposureMeter {
     const read = this.half ? (i: number) => decodeHalf(pixels[i]!) : (i: number) => pixels[i]!;
     const out: number[] = [];
     for (let i = 0; i < pixels.length; i += 4) {
-      // Only what was drawn upon: the background is no light.
-      if (read(i + 3) > 0) out.push(0.2126 * read(i) + 0.7152 * read(i + 1) + 0.0722 * read(i + 2));
+      // Alpha 0 is the background, which is no light.
+      if (read(i + 3) > 0) out.push(luminance([read(i), read(i + 1), read(i + 2)]));
     }
     return out;
   }
 }
 
-/** Of a picture that shows nothing else which has light. */
+/** The exposure of a picture in which only the sky has light. */
 function ofSky(sky: SkyBackground, camera: PerspectiveCamera): number | undefined {
   return exposureOf(
     Array.from({ length: WIDTH * HEIGHT }, (_, i) => {

@@ -1,22 +1,22 @@
-// Brings a small picture back from the card without waiting for it: the page looks now and then whether it is there. From a
-// slow card it is fetched while that has nothing else to do, as Chromium answers in turn, after all that it was given
-// meanwhile.
+// Reads a small picture back from the card without waiting for it: the page looks now and then whether the picture is
+// there. It fetches the picture while the card has nothing else to do, as Chromium answers only after all that the card
+// was given meanwhile.
 
-/** Between looks; where a card takes long, it is not asked as often. */
+import { pause } from '../../page/pause';
+
+/** Time between looks; longer after a while. */
 const LOOK_MS = 4;
 const SELDOM_MS = 50;
 const LONG_MS = 2000;
-/** A card that has not drawn it by then is not asked for it: to fetch it would hold the page up until it has. */
+/** After so long the picture is given up: to fetch a picture that is not drawn yet would hold the page up. */
 const MOST_WAIT_MS = 60_000;
-/** A page that always draws something gets its picture all the same. */
+/** Longest wait for a quiet card, as some pages always draw something. */
 const MOST_QUIET_MS = 1000;
 
-const look = (ms = LOOK_MS) => new Promise((resolve) => setTimeout(resolve, ms));
-
 export class Readback {
-  /** Pictures that are there to be fetched. */
+  /** Pictures that are drawn and wait to be fetched. */
   private waiting = 0;
-  /** Raised when a context is lost: what was on its way in it never comes. */
+  /** Counts lost contexts: pictures of an earlier context never come. */
   private context = 0;
 
   constructor(
@@ -27,19 +27,19 @@ export class Readback {
     private readonly isQuiet: () => boolean,
   ) {}
 
-  /** A picture is there to be fetched: nothing else is to be drawn until it is. */
+  /** A picture waits to be fetched; until then nothing else should be drawn. */
   get arrived(): boolean {
     return this.waiting > 0;
   }
 
   /**
-   * Of the framebuffer that is bound, RGBA, into `pixels`. Ends when they are there. Rejects where the context is lost on
-   * the way, and where the card has not drawn them after a minute.
+   * Reads the bound framebuffer into `pixels`, as RGBA. Rejects when the context is lost, and when the card has not
+   * drawn the picture after a minute.
    */
   async read(pixels: Uint16Array | Float32Array): Promise<void> {
     const { gl } = this;
     const { context } = this;
-    const buffer = gl.createBuffer(); // Chromium warns of one that is written twice
+    const buffer = gl.createBuffer(); // a new one each time, as Chromium warns of buffers that are written twice
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
     gl.bufferData(gl.PIXEL_PACK_BUFFER, pixels.byteLength, gl.STREAM_READ);
     gl.readPixels(0, 0, this.width, this.height, gl.RGBA, this.type, 0);
@@ -57,7 +57,7 @@ export class Readback {
     gl.deleteBuffer(buffer);
   }
 
-  /** With the context its buffers are gone. */
+  /** The context is lost, and its buffers with it. */
   forget(): void {
     ++this.context;
   }
@@ -65,13 +65,14 @@ export class Readback {
   private async quiet(): Promise<void> {
     ++this.waiting;
     try {
-      for (const end = performance.now() + MOST_QUIET_MS; !this.isQuiet() && performance.now() < end; ) await look();
+      for (const end = performance.now() + MOST_QUIET_MS; !this.isQuiet() && performance.now() < end; )
+        await pause(LOOK_MS);
     } finally {
       --this.waiting;
     }
   }
 
-  /** False: it is not drawn yet. */
+  /** Waits until the picture is drawn. False: it took too long. */
   private async arrival(): Promise<boolean> {
     const { gl } = this;
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -79,8 +80,8 @@ export class Readback {
     gl.flush();
     const begin = performance.now();
     const passed = () => performance.now() - begin;
-    const isDrawn = () => gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.UNSIGNALED; // of a lost context, too
-    while (!isDrawn() && passed() < MOST_WAIT_MS) await look(passed() < LONG_MS ? LOOK_MS : SELDOM_MS);
+    const isDrawn = () => gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.UNSIGNALED; // also true of a lost context
+    while (!isDrawn() && passed() < MOST_WAIT_MS) await pause(passed() < LONG_MS ? LOOK_MS : SELDOM_MS);
     const drawn = isDrawn();
     gl.deleteSync(fence);
     return drawn;

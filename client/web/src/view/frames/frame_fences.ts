@@ -1,6 +1,6 @@
-// Tells when the card has drawn what it was given, without waiting for it: a fence behind each frame.
+// Tells when the card has drawn a frame, without waiting for it, by a fence behind each frame.
 
-/** A driver that never says it is done holds nothing up for longer. */
+/** Longest wait for a driver that never reports a frame as done. */
 const MOST_WAIT_MS = 3000;
 
 export class FrameFences {
@@ -16,7 +16,7 @@ export class FrameFences {
     this.pending.push({ fence, sinceMs: nowMs });
   }
 
-  /** How many frames have been done since the last call; costs some microseconds. */
+  /** Number of frames that were done since the last call. Takes some microseconds. */
   poll(nowMs: number): number {
     const { gl } = this;
     const open = this.pending.findIndex(
@@ -28,7 +28,7 @@ export class FrameFences {
     return done.length;
   }
 
-  /** With the context its fences are gone. */
+  /** The context is lost, and its fences with it. */
   forget(): void {
     this.pending = [];
   }

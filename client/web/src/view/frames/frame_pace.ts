@@ -1,28 +1,28 @@
-// How finely to draw, and when, so that moving about stays smooth where frames take long (a weak card, or none). While
-// something moves, fewer pixels are drawn; as soon as all is at rest, all of them. Pure: is told what frames cost.
+// Decides when to draw and with how many pixels, so that movement stays smooth on a weak card or in software. While
+// something moves, fewer pixels are drawn; at rest, all of them. Pure: the caller passes the time.
 
-/** Of each side of the picture: every step has half the pixels of the one before. */
+/** Scales of each side of the picture; each has half the pixels of the one before. */
 export const SCALES = [1, Math.SQRT1_2, 0.5, 0.5 * Math.SQRT1_2, 0.25] as const;
 
-/** What moves is drawn so finely that a frame takes no longer, where the coarsest scale can do that. */
+/** Longest frame while something moves, if the coarsest scale allows it. */
 export const MOVING_FRAME_MS = 40;
-/** Nothing has moved for so long, and for so many turns of a page that may be slow: all is at rest. */
+/** The picture is at rest when nothing has moved for so long and for so many turns of the page, which may be slow. */
 const REST_MS = 200;
 const REST_TURNS = 3;
-/** Of light that comes in quick succession coarse pictures go before the sharp one, but for no longer. */
+/** While light comes in quick succession, coarse pictures precede the sharp one, but for no longer than this. */
 const MOST_COARSE_MS = 1000;
-/** Frames at rest leave a slow card some of the time they take, so that what moves next need not wait; but no more. */
+/** Frames at rest leave a slow card free for a part of their time, so that the next movement need not wait. */
 const PAUSE_SHARE = 0.3;
 const MOST_PAUSE_MS = 500;
-/** What an edit changes waits so long for its light, where a picture without it would be what the light has to wait for. */
+/** Longest wait for the light of an edit: on a slow card the light would have to wait for a picture without it. */
 const MOST_AWAIT_MS = 100;
-/** And the first of some tiles so long for the others, which would have to wait for a picture of it alone. */
+/** Longest wait for more tiles, which would have to wait for a picture of the first one alone. */
 const MOST_GATHER_MS = 40;
-/** One is drawn while the next is made: more would only show what is asked for later. */
+/** One frame is drawn while the next is prepared. More would only delay what the user asks for next. */
 const MOST_UNDER_WAY = 2;
-/** Of a whole frame, where the browser says that it draws without a card: 2560 x 1600 on two cores, about. */
+/** A frame with all pixels in software: about that of 2560 x 1600 on two cores. */
 const SOFTWARE_FRAME_MS = 300;
-/** A page that nobody looked at has not been told when its frames were done. */
+/** Longer frames do not count: a hidden page is not told when its frames are done. */
 const LONGEST_FRAME_MS = 5000;
 
 interface Frame {
@@ -32,10 +32,10 @@ interface Frame {
 }
 
 export class FramePace {
-  /** What the first frame is likely to be drawn with. */
+  /** The likely scale of the first frame. */
   readonly firstScale: number;
   private readonly underWay: Frame[] = [];
-  /** What frames with all pixels would take, by the newest two that were measured. */
+  /** Time of a frame with all pixels, estimated from each of the last two frames. */
   private wholeFrameMs: [number, number];
   private lastEndMs = -Infinity;
   private lastTookMs = 0;
@@ -43,23 +43,23 @@ export class FramePace {
   private lastTurnMs = -Infinity;
   private turnsSinceHurry = Infinity;
   private turns = 0;
-  /** After how many turns the newest two frames were done. */
+  /** Turns that each of the last two frames took. */
   private turnsTaken: [number, number] = [Infinity, Infinity];
   private lastScale = 1;
-  /** Until when, at most, the next frame waits for light, and for more of it; undefined: it has not waited for any. */
+  /** Until when the next frame waits for light, and for more light; undefined: it has not waited. */
   private awaitUntilMs: number | undefined;
   private gatherUntilMs: number | undefined;
-  /** Since when light has come to a picture that is coarse. */
+  /** Since when light has come while the picture was coarse. */
   private coarseSinceMs: number | undefined;
 
-  /** `software`: no card draws, as far as is known. */
+  /** `software`: the browser draws in software, as far as it tells. */
   constructor(software: boolean) {
     const guess = software ? SOFTWARE_FRAME_MS : 0;
     this.wholeFrameMs = [guess, guess];
     this.firstScale = this.movingScale;
   }
 
-  /** Once for every turn of the page, before anything else. */
+  /** Once a turn of the page, before anything else. */
   turn(nowMs: number): void {
     if (nowMs > this.lastTurnMs) {
       ++this.turnsSinceHurry;
@@ -68,26 +68,26 @@ export class FramePace {
     this.lastTurnMs = nowMs;
   }
 
-  /** Something was edited, and its light is a moment behind. A card that is quick shows the one and then the other. */
+  /** An edit was made, and its light will follow soon. A quick card shows one after the other without waiting. */
   awaitLight(nowMs: number): void {
     if (this.movingScale < 1) this.awaitUntilMs ??= nowMs + MOST_AWAIT_MS;
   }
 
-  /** Something is moved by hand: that does not wait. */
+  /** The user moves something, which must not wait for light. */
   moved(nowMs: number): void {
     this.awaitUntilMs = this.gatherUntilMs = -Infinity;
     this.hurry(nowMs);
   }
 
-  /** Something moves, and for so long a soon picture is worth more than a sharp one. */
+  /** Something moves: for so long a soon picture is worth more than a sharp one. */
   hurry(nowMs: number, forMs = REST_MS): void {
     this.turnsSinceHurry = 0;
     this.hurryUntilMs = Math.max(this.hurryUntilMs, nowMs + forMs);
   }
 
   /**
-   * Tiles have been taken up. A sharp picture of the first of them would keep a slow card from showing the next ones; one
-   * that is sharp already stays so, as it would flicker otherwise.
+   * Tiles were taken up. While the picture is coarse, the next ones are, too, as a sharp picture of the first tiles
+   * would delay the others on a slow card. A sharp picture stays sharp, as it would flicker otherwise.
    */
   lightCame(nowMs: number): void {
     this.awaitUntilMs = -Infinity;
@@ -98,22 +98,22 @@ export class FramePace {
     if (leftMs > 0) this.hurry(nowMs, Math.min(REST_MS, leftMs));
   }
 
-  /** No more is on its way. */
+  /** No more tiles are on their way. */
   allCame(): void {
     if (this.gatherUntilMs !== undefined) this.gatherUntilMs = -Infinity;
   }
 
-  /** Turns are counted as they come: one long turn, as when a scene is taken up, says nothing of the next ones. */
+  /** Turns count as well as time, as one long turn, such as that which builds a scene, says nothing about the next. */
   private isHurried(nowMs: number): boolean {
     return nowMs < this.hurryUntilMs || this.turnsSinceHurry < REST_TURNS;
   }
 
-  /** What is on the screen was drawn in a hurry that is over: it is to be drawn anew. */
+  /** The last frame was coarse, and the hurry is over: a sharp frame is due. */
   isSharpDue(nowMs: number): boolean {
     return this.lastScale < 1 && !this.isHurried(nowMs);
   }
 
-  /** The scale of a frame that is drawn now; undefined: later, as the card has enough to do. */
+  /** The scale of a frame that may be drawn now; undefined: not yet. */
   ask(nowMs: number): number | undefined {
     if (nowMs < Math.max(this.awaitUntilMs ?? -Infinity, this.gatherUntilMs ?? -Infinity)) return undefined;
     if (this.isHurried(nowMs)) return this.underWay.length < MOST_UNDER_WAY ? this.movingScale : undefined;
@@ -121,25 +121,25 @@ export class FramePace {
     return this.underWay.length > 0 || nowMs - this.lastEndMs < pause ? undefined : 1;
   }
 
-  /** The card has drawn all that it was given. */
+  /** The card has drawn all frames. */
   get isIdle(): boolean {
     return this.underWay.length === 0;
   }
 
   /**
-   * Who asks it for something waits for less than a turn: it is idle, or has one frame, and was done with the last two by the
-   * turn after theirs.
+   * The card answers in less than a turn: it is idle, or has one frame to draw, and has drawn each of the last two
+   * within a turn.
    */
   get isQuiet(): boolean {
     return this.isIdle || (this.underWay.length === 1 && this.turnsTaken.every((turns) => turns <= 1));
   }
 
-  /** The picture is sharp, and nothing is being drawn or moves. */
+  /** The picture is sharp, nothing is being drawn, and nothing moves. */
   isAtRest(nowMs: number): boolean {
     return this.isIdle && this.lastScale === 1 && !this.isHurried(nowMs);
   }
 
-  /** A frame was handed to the card. */
+  /** The card was given a frame. */
   began(nowMs: number, scale: number): void {
     this.underWay.push({ scale, begunMs: nowMs, turn: this.turns });
     this.lastScale = scale;
@@ -148,8 +148,8 @@ export class FramePace {
   }
 
   /**
-   * The card is done with the oldest frames. Of more than one in the same turn it is known only what all of them took
-   * together: none of them was drawn in no time.
+   * The card has drawn the oldest frames. Where it has drawn several in one turn, only their total time is known, which
+   * is divided by their pixels.
    */
   ended(nowMs: number, count: number): void {
     const frames = this.underWay.splice(0, count);
@@ -164,13 +164,13 @@ export class FramePace {
     this.wholeFrameMs = [this.wholeFrameMs[1], tookMs / pixels];
   }
 
-  /** The card was taken away, and all it had to draw. */
+  /** The context is lost, and its frames with it. */
   forget(): void {
     this.underWay.length = 0;
     this.turnsTaken = [Infinity, Infinity];
   }
 
-  /** The finest that is quick enough. One slow frame may be a hiccup (a program being compiled): two are not. */
+  /** The finest scale that is quick enough. One slow frame may be a hiccup (a program being compiled); two are not. */
   private get movingScale(): number {
     const wholeMs = Math.min(...this.wholeFrameMs);
     return SCALES.find((scale) => wholeMs * scale ** 2 <= MOVING_FRAME_MS) ?? SCALES.at(-1)!;

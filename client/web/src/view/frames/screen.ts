@@ -1,18 +1,18 @@
-// What frames are drawn into: a buffer beside the canvas, of as many pixels as there is time for, and then brought onto the
-// canvas, which keeps its size. To change that makes a browser wait for all that the card has to draw: seconds, where
-// software draws. What is needed is asked of OpenGL itself, as no answer of it is to be waited for.
+// Draws frames into a buffer with as many pixels as there is time for, and copies it onto the canvas, which keeps its
+// size: to change the canvas's size makes browsers wait for all that the card has to draw, which takes seconds in
+// software. Uses OpenGL directly, as three.js would wait for answers.
 
 import { WebGLRenderTarget, type WebGLRenderer } from 'three';
 
-/** What browsers give a canvas that asks for smooth edges. */
+/** Samples a pixel, as browsers give a canvas with smooth edges. */
 const SAMPLES = 4;
 
-/** three.js has it for headsets. Draws into a framebuffer that it did not make, and leaves that to us. */
+/** A method of three.js for headsets: draws into a framebuffer that three.js does not own. */
 interface TakesFramebuffers {
   setRenderTargetFramebuffer(target: WebGLRenderTarget, framebuffer: WebGLFramebuffer): void;
 }
 
-/** Pixels of one size: the samples that are drawn, and what they come to. 36 bytes a pixel on the card. */
+/** Buffers of one size, for the samples and for the resolved pixels. 36 bytes a pixel on the card. */
 class Layer {
   readonly target: WebGLRenderTarget;
   private readonly buffers: WebGLRenderbuffer[] = [];
@@ -26,7 +26,7 @@ class Layer {
     readonly height: number,
   ) {
     const samples = Math.min(SAMPLES, renderer.capabilities.maxSamples);
-    renderer.setRenderTarget(null); // as it is left
+    renderer.setRenderTarget(null); // the state that this leaves OpenGL in
     this.drawn = gl.createFramebuffer();
     this.attach(this.drawn, gl.COLOR_ATTACHMENT0, gl.RGBA8, samples);
     this.attach(this.drawn, gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24, samples);
@@ -37,7 +37,7 @@ class Layer {
     (renderer as unknown as TakesFramebuffers).setRenderTargetFramebuffer(this.target, this.drawn);
   }
 
-  /** The canvas's framebuffer is bound before and after, as three.js believes. */
+  /** The canvas's framebuffer is bound before and after, as three.js expects. */
   bringTo(width: number, height: number): void {
     const { gl } = this;
     const size = [0, 0, this.width, this.height] as const;
@@ -70,13 +70,13 @@ class Layer {
 }
 
 export class Screen {
-  /** Pixels that the last frame was drawn with. */
+  /** Size in pixels of the last frame. */
   drawn: readonly [number, number] = [0, 0];
-  /** What was asked for, and what the browser gave: where memory is scarce that is less. */
+  /** The wanted size, and the canvas's actual size, which is smaller where memory is scarce. */
   private asked = '';
   private size: readonly [number, number] = [1, 1];
   private whole: Layer | undefined;
-  /** Of what moves: of the last scale alone, as that seldom changes. */
+  /** For frames of movement. Only one is kept, as their scale seldom changes. */
   private coarse: Layer | undefined;
 
   constructor(
@@ -84,19 +84,19 @@ export class Screen {
     private readonly gl: WebGL2RenderingContext,
   ) {}
 
-  /** Of the canvas, CSS pixels. Clears it, and waits for the card; does nothing where it has that size. */
+  /** Size of the canvas in CSS pixels. A change clears the canvas and waits for the card. */
   resize(width: number, height: number, ratio: number): void {
     const [wide, high] = [width, height].map((side) => Math.floor(side * ratio)) as [number, number];
     if (this.asked === `${wide},${high}`) return;
     this.asked = `${wide},${high}`;
     this.renderer.setDrawingBufferSize(width, height, ratio);
-    // Of a context that is lost it is nothing: what was asked for comes back with it.
+    // A lost context has size 0, and returns with the wanted size.
     this.size = [this.gl.drawingBufferWidth || wide, this.gl.drawingBufferHeight || high];
     for (const layer of [this.whole, this.coarse]) layer?.dispose();
     this.whole = this.coarse = undefined;
   }
 
-  /** Draws with so many of the canvas's pixels, by each side, and brings that onto all of it. */
+  /** Draws a frame. `scale`: of each side of the canvas. */
   draw(scale: number, render: () => void): void {
     const layer = this.layerOf(scale);
     this.renderer.setRenderTarget(layer.target);
@@ -106,7 +106,7 @@ export class Screen {
     this.drawn = [layer.width, layer.height];
   }
 
-  /** The context is lost, and all layers with it. */
+  /** The context is lost, and its layers with it. */
   forget(): void {
     this.whole = this.coarse = undefined;
   }

@@ -1,37 +1,37 @@
-// One page of light: the texels as they came, the texture that is drawn from, and which tiles of which mip are there.
-// The texels are kept in memory too: the light meter reads them, and a lost WebGL context is filled from them.
-// 4 bytes a texel here and on the card, each with a third more for the mips; while a page is stored anew under another
-// exponent, once more on the card.
+// One page of light: its texels, its texture, and the finest mip that has come for each tile. The texels are also kept
+// in memory: the light meter reads them, and a lost WebGL context is filled from them. A texel takes 4 bytes here and
+// on the card, and the mips a third more; while a page moves to another exponent, its texture is on the card twice.
 
 import { DataTexture, ExternalTexture, NearestFilter, RedFormat, UnsignedByteType, type WebGLRenderer } from 'three';
+import { luminance } from '../../page/colours';
 import { rescaled, TILE_SIDE, type Tile } from '../../protocol/tile_frame';
 import { decodeRgb9e5 } from '../../protocol/rgb9e5';
 import type { PageSize } from '../../protocol/messages';
 import { PageRescale, type Mip, type Slab } from './page_rescale';
 
 export const NO_MIP = 255;
-/** Coarser mips than this say nothing: they are 1/32 of the page. */
+/** Mips of a page. Coarser ones than 1/32 of the page show nothing of use. */
 export const MOST_MIPS = 6;
 /**
- * A page's exponent grows in such steps: storing a page of 4096 x 4096 anew takes many frames, and shall not happen for
- * every tile that is a little brighter. What is 2^22 times darker than the brightest keeps its nine bits.
+ * The exponent of a page grows in large steps, as rescaling a page of 4096 x 4096 takes many frames and must not happen
+ * for every tile that is a little brighter. Values 2^22 times darker than the brightest still keep their nine bits.
  */
 const EXPONENT_STEP = 8;
 
-/** A page that is being stored anew: the texture to be, and its exponent. */
+/** A page on its way to another exponent: its new texture, and the new exponent. */
 interface Growth {
   rescale: PageRescale;
   texture: WebGLTexture;
   exponent: number;
 }
 
-/** The exponent under which a page stores tiles of this one. */
+/** The exponent of a page for tiles of a given exponent. */
 export function pageExponent(tileExponent: number): number {
   return EXPONENT_STEP * Math.ceil(tileExponent / EXPONENT_STEP);
 }
 
 export class LightmapPage {
-  /** Of the finest mip that is kept. */
+  /** Size of the finest mip that is kept. */
   readonly width: number;
   readonly height: number;
   /** The part of the texture that the page fills. */
@@ -45,13 +45,13 @@ export class LightmapPage {
   private readonly mips: Mip[] = [];
   private readonly columns: number;
   private readonly rows: number;
-  /** Tiles of which nothing has come yet, and of which the finest mip has not. */
+  /** Tiles that nothing has come for, and tiles that the finest mip has not come for. */
   private missing: number;
   private coarse: number;
   private gotTile = false;
   private growth: Growth | undefined;
 
-  /** `baseMip`: the finest mip to keep, where the whole would not fit into memory. */
+  /** `baseMip`: the finest mip to keep; above 0 where the whole page would not fit into memory. */
   constructor(
     private readonly renderer: WebGLRenderer,
     size: PageSize,
@@ -61,7 +61,7 @@ export class LightmapPage {
     this.width = Math.ceil(size.width / 2 ** baseMip);
     this.height = Math.ceil(size.height / 2 ** baseMip);
     const levels = Math.max(1, Math.min(MOST_MIPS, size.mips - baseMip));
-    // The server halves upwards, OpenGL downwards: of a size that divides without rest both make the same mips.
+    // The server rounds halves up, OpenGL down: with a size that divides without rest both have the same mips.
     const unit = 2 ** (levels - 1);
     const [width, height] = [this.width, this.height].map((side) => Math.ceil(side / unit) * unit) as [number, number];
     this.used = [this.width / width, this.height / height];
@@ -99,7 +99,7 @@ export class LightmapPage {
     return this.missing === 0;
   }
 
-  /** All light is there, as finely as it is kept. */
+  /** The finest light is known everywhere. */
   get whole(): boolean {
     return this.coarse === 0;
   }
@@ -109,8 +109,8 @@ export class LightmapPage {
   }
 
   /**
-   * Sees to it that the page can hold values as bright as the tile's. A page that cannot is stored anew, some rows a
-   * call until `endMs` (of performance.now()), while it is drawn as it was. False: not done; call again before put().
+   * Makes room for values as bright as the tile's. Where the page has to be rescaled, each call rescales some rows,
+   * until `endMs` (of performance.now()); meanwhile the old texture is drawn. False: call again before put().
    */
   makeRoom(tile: Tile, endMs: number): boolean {
     if (!this.gotTile) this.exponent = pageExponent(tile.exponent);
@@ -124,14 +124,14 @@ export class LightmapPage {
         this.gl.deleteTexture(this.drawn);
         this.texture.sourceTexture = texture;
         this.exponent = exponent;
-        return this.makeRoom(tile, endMs); // an even brighter one may have come first
+        return this.makeRoom(tile, endMs); // an even brighter tile may have come first
       }
       this.uploadRows(texture, slab);
     } while (performance.now() < endMs);
     return false;
   }
 
-  /** Takes a tile up, for which there is room. False: it is not of this page. */
+  /** Takes up a tile for which there is room. False: the tile does not fit this page. */
   put(tile: Tile): boolean {
     const { header } = tile;
     const level = header.mip - this.baseMip;
@@ -150,7 +150,7 @@ export class LightmapPage {
     return true;
   }
 
-  /** Irradiance in lux at texture coordinates, bilinear, from the finest mip that is there; undefined: none yet. */
+  /** Bilinear irradiance in lux at texture coordinates, from the finest mip that has come; undefined: none has. */
   sample(u: number, v: number): [number, number, number] | undefined {
     const column = Math.min(this.columns - 1, Math.max(0, Math.floor((u * this.width) / TILE_SIDE)));
     const row = Math.min(this.rows - 1, Math.max(0, Math.floor((v * this.height) / TILE_SIDE)));
@@ -175,7 +175,7 @@ export class LightmapPage {
     return sum;
   }
 
-  /** At most `count` of the texels' values, lux, luminance; for the range of the legend. */
+  /** At most `count` of the texels' values (lux, luminance). */
   someValues(count: number): number[] {
     const fits = this.mips.findIndex((m) => m.width * m.height <= count);
     const level = fits < 0 ? this.mips.length - 1 : fits;
@@ -184,14 +184,13 @@ export class LightmapPage {
     const step = Math.ceil(mip.texels.length / count) | 1;
     const out: number[] = [];
     for (let i = 0; i < mip.texels.length; i += step) {
-      const [r, g, b] = decodeRgb9e5(mip.texels[i]!);
-      const value = (0.2126 * r + 0.7152 * g + 0.0722 * b) * this.scaleAt(level, i);
+      const value = luminance(decodeRgb9e5(mip.texels[i]!)) * this.scaleAt(level, i);
       if (value > 0) out.push(value);
     }
     return out;
   }
 
-  /** Makes the texture anew from the texels, after construction or when a lost WebGL context is back. */
+  /** Makes the texture from the texels: at first, and when a lost WebGL context is back. */
   restore(): void {
     this.finishGrowth();
     this.texture.sourceTexture = this.makeTexture();
@@ -202,7 +201,7 @@ export class LightmapPage {
     this.resident.needsUpdate = true;
   }
 
-  /** The context is lost: three.js is to forget the textures that it knew. */
+  /** The context is lost: makes three.js forget the page's textures. */
   release(): void {
     this.texture.dispose();
     this.resident.dispose();
@@ -243,13 +242,12 @@ export class LightmapPage {
     if (changed) this.resident.needsUpdate = true;
   }
 
-  /** A brighter tile than the page can hold has come: everything there is to be stored under a larger scale. */
   private grow(exponent: number): Growth {
     const rescale = new PageRescale(this.mips, this.exponent - exponent);
     return { rescale, texture: this.makeTexture(), exponent };
   }
 
-  /** With the context its texture is gone: the rest of the texels follow at once. */
+  /** The texture is gone with the context, so the rest of the texels can be rescaled at once. */
   private finishGrowth(): void {
     if (!this.growth) return;
     while (this.growth.rescale.next());
@@ -257,14 +255,14 @@ export class LightmapPage {
     this.growth = undefined;
   }
 
-  /** Of one texel in memory, which may be stored anew already or not yet. */
+  /** The scale of one texel in memory, which may or may not be rescaled already. */
   private scaleAt(level: number, index: number): number {
     const { growth } = this;
     const isNew = growth?.rescale.has(level, Math.floor(index / this.mips[level]!.width));
     return 2 ** (isNew ? growth!.exponent : this.exponent);
   }
 
-  /** An empty texture of the page's size; values are undefined where no tile has come, and are not drawn. */
+  /** An empty texture of the page's size. Values that no tile has set are undefined, and are not drawn. */
   private makeTexture(): WebGLTexture {
     const gl = this.gl;
     const texture = gl.createTexture()!;

@@ -1,5 +1,5 @@
-// A page's texels brought under another exponent, some rows at a time: all 22 million of a page of 4096 x 4096 at once
-// would hold the page up for several frames. Pure; the page uploads what comes out.
+// Moves the texels of a lightmap page to another exponent, some rows at a time: all 22 million texels of a page of 4096
+// x 4096 would take several frames. Pure; the lightmap page uploads the result.
 
 import { scaleRgb9e5 } from '../../protocol/rgb9e5';
 
@@ -25,21 +25,21 @@ export class PageRescale {
   private level = 0;
   private row = 0;
 
-  /** Texels x 2^shift; `shift` is what the page's exponent falls by, so negative where it grows. */
+  /** Multiplies texels by 2^shift. `shift`: old exponent less new exponent. */
   constructor(
     private readonly mips: readonly Mip[],
     private readonly shift: number,
     private readonly slabTexels = SLAB_TEXELS,
   ) {}
 
-  /** Brings the next rows under the new exponent, in place; undefined: all are. */
+  /** Rescales the next rows in place; undefined: all are done. */
   next(): Slab | undefined {
     const mip = this.mips[this.level];
     if (!mip) return undefined;
     const { level, row } = this;
     const rows = Math.min(mip.height - row, Math.max(1, Math.floor(this.slabTexels / mip.width)));
     const texels = mip.texels.subarray(row * mip.width, (row + rows) * mip.width);
-    for (let i = 0; i < texels.length; ++i) texels[i] = scaleRgb9e5(texels[i]!, this.shift); // a fifth of forEach's time
+    for (let i = 0; i < texels.length; ++i) texels[i] = scaleRgb9e5(texels[i]!, this.shift); // five times as fast as forEach
     this.row += rows;
     if (this.row === mip.height) {
       ++this.level;
@@ -48,7 +48,7 @@ export class PageRescale {
     return { level, row, rows, texels };
   }
 
-  /** The row is under the new exponent already. */
+  /** Whether the row is rescaled already. */
   has(level: number, row: number): boolean {
     return level < this.level || (level === this.level && row < this.row);
   }

@@ -1,28 +1,28 @@
-// What a link says of how a view is shown, beside its camera: text behind the # of an address, and back. Anybody may have
-// written it: what is not sound counts as not said. Pure.
+// How a link describes a view, apart from its camera: the text behind the # of an address. Anybody may have written a
+// link, so unsound values are ignored. Pure.
 
 import { TONE_CURVES } from './view_modes';
 
 export const MOST_STOPS = 8;
-/** Of a manual exposure, and of either end of a scale: nothing that anybody measures is beyond. */
+/** Bounds of a manual exposure and of a scale; no measured value lies beyond them. */
 const LEAST = 1e-12;
 const MOST = 1e12;
 
-/** Undefined: as it is without a link. */
+/** Undefined members have their defaults. */
 export interface ShownAs {
   /** Steps of two, added to the exposure. */
   stops?: number | undefined;
   /** A manual exposure, before those steps: what radiance in nits is multiplied by. */
   exposure?: number | undefined;
-  /** Of TONE_CURVES. */
+  /** Id of one of TONE_CURVES. */
   tone?: string | undefined;
-  /** Lowest and highest value of the false colours, where they do not follow the light. */
+  /** Lowest and highest value of the false colours; undefined: the scale follows the light. */
   scale?: [number, number] | undefined;
 }
 
 const brief = (value: number) => String(Number(value.toPrecision(4)));
 
-/** Members of the hash; what is as it is without a link is left out. */
+/** Members of the hash, without those that have their defaults. */
 export function toLink({ stops, exposure, tone, scale }: ShownAs): Record<string, string> {
   return {
     ...(stops ? { stops: brief(stops) } : {}),
@@ -48,7 +48,7 @@ function scaleOf(text: string | null): [number, number] | undefined {
   return ends?.length === 2 && low && high && low < high ? [low, high] : undefined;
 }
 
-/** Written in digits, and within bounds. */
+/** A number in digits, within bounds; undefined: the text is none. */
 function numberIn(text: string | null, least: number, most: number): number | undefined {
   if (!text || text.length > 24 || !/^-?\d*\.?\d+(e[+-]?\d+)?$/i.test(text)) return undefined;
   const value = Number(text);

@@ -1,8 +1,8 @@
-// The colours of false-colour pictures: one list for the shader and for the legend.
+// The colours of false-colour pictures, for the shader and for the legend.
 
 /**
- * sRGB, from dark to bright: every ninth colour of viridis (Smith and van der Walt, matplotlib 1.5, 2015; CC0), whose
- * lightness rises evenly all the way, so that more is brighter also to those who see no hues, and in print.
+ * sRGB, from dark to bright: nine colours of viridis (Smith and van der Walt, matplotlib 1.5, 2015; CC0). Its lightness
+ * rises evenly, so that more looks brighter also in print and to people who see no hues.
  */
 export const STOPS: readonly (readonly [number, number, number])[] = [
   [68, 1, 84],
@@ -16,10 +16,10 @@ export const STOPS: readonly (readonly [number, number, number])[] = [
   [253, 231, 37],
 ].map(([r, g, b]) => [r! / 255, g! / 255, b! / 255] as const);
 
-/** Where nothing is measured: darker than the least. */
+/** The colour where there is nothing to measure: darker than the lowest value. */
 export const NOTHING = STOPS[0]!.map((c) => 0.5 * c);
 
-/** sRGB, of mip 0, 1, ...; between them where a lookup lies between two mips. */
+/** sRGB, for mip 0, 1, ... A lookup between two mips gets a colour between theirs. */
 export const MIP_STOPS: readonly (readonly [number, number, number])[] = [
   [0.16, 0.55, 0.9],
   [0.1, 0.68, 0.56],

@@ -1,13 +1,13 @@
-// What the viewer can show of the scene. Numbers are those of the shader (lit_shader.ts).
+// The views of the scene. Their numbers are those of the shader (lit_shader.ts).
 
 export interface ViewMode {
   id: string;
   label: string;
   number: number;
   hint: string;
-  /** Quantity of the tiles that are needed; what the server does not stream cannot be shown. */
+  /** Quantity of the tiles that the view needs. */
   quantity: 'irradiance' | 'radiosity' | 'error' | 'unshot' | 'patchId' | 'mipLevel';
-  /** What the false-colour legend calls it, where that is not the label. */
+  /** Title of the false-colour legend; undefined: the label. */
   legend?: string;
   /** Unit of the false-colour legend; undefined: there is nothing to measure. */
   unit?: string;
@@ -104,7 +104,7 @@ export function viewMode(id: string): ViewMode {
   return VIEW_MODES.find((mode) => mode.id === id) ?? VIEW_MODES[0]!;
 }
 
-/** What a picture in the colours of light shows: light that leaves the surfaces, or light that reaches them, over pi. */
+/** The light of a picture: the light that leaves the surfaces, or the light that reaches them, divided by pi. */
 export type ShownLight = 'leaving' | 'arriving';
 
 export function shownLight({ number }: ViewMode): ShownLight {

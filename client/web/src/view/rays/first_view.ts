@@ -1,40 +1,42 @@
-// Where to look from at first in a scene without a camera of its own. From outside one sees all of it, but of a closed room
-// with its lamps inside nothing except unlit walls: there one stands in the room, where its longest line of sight ends.
+// The first view of a scene without a camera. An overview from outside shows only the unlit outer walls of a closed
+// room with its lamps inside; there the first view is from inside the room, at the end of its longest line of sight.
 
 import { DoubleSide, Mesh, Triangle, Vector3, type PerspectiveCamera } from 'three';
 import { LitMaterial } from '../scene/lit_material';
 import type { LitScene } from '../scene/lit_scene';
+import { trianglesOf } from '../scene/object_box';
 import { RayTree } from './ray_tree';
+import { spreadPoint } from './spread';
 
 export interface Place {
   eye: Vector3;
   target: Vector3;
 }
 
-/** A point of a lamp, and where it shines; without a direction: everywhere. */
+/** A point of a lamp, and the direction in which it shines; undefined: all directions. */
 interface LampPoint {
   at: Vector3;
   facing: Vector3 | undefined;
-  /** Its light comes from far away, wherever it hangs. */
+  /** The light comes from far away, wherever the lamp is placed. */
   isSun: boolean;
 }
 
-/** From outside as much of what is seen has a lamp in sight, or no place inside shows much more: one stays there. */
+/** Stay outside where so large a part of the view is lit, or where no place inside shows so many times more. */
 const LEAST_LIT = 0.5;
 const LEAST_GAIN = 1.5;
 const RAYS = 32;
 const MOST_LAMP_POINTS = 4;
-/** To find out where so many are takes half a second. */
+/** So many triangles take half a second to search. */
 const MOST_TRIANGLES = 200_000;
 const DIRECTIONS = 12;
-/** Metres, of who stands; in a model of another size, and under a low ceiling, the middle of the height. */
+/** Metres above the floor; half of the height in smaller models, and under a low ceiling. */
 const EYE_HEIGHT = 1.6;
-/** Of the way to the wall at one's back. */
+/** Part of the way to the wall behind the viewer. */
 const BACK = 0.85;
-/** Of the scene's size: what is as near as that to where a ray begins is where it begins. */
+/** Of the scene's size: hits nearer than this are the surface that the ray starts from. */
 const NEAR = 1e-6;
 
-/** `outside`: looks at the whole scene. Undefined: its picture is good enough. `hasSky`: light comes from outside. */
+/** A view from inside; undefined: the overview `outside` is good enough. `hasSky`: light comes from outside. */
 export function insideView(scene: LitScene, outside: PerspectiveCamera, hasSky = false): Place | undefined {
   if (hasSky || scene.triangles > MOST_TRIANGLES) return undefined;
   scene.root.updateMatrixWorld(true);
@@ -58,7 +60,7 @@ export function insideView(scene: LitScene, outside: PerspectiveCamera, hasSky =
   return best;
 }
 
-/** Some points, evenly among all lamps and among the triangles of surfaces that shine. */
+/** Some points, evenly spread over the lamps and the triangles of emitting surfaces. */
 function lampPoints(scene: LitScene): LampPoint[] {
   const all: LampPoint[] = [...scene.lamps.values()].map((lamp) => ({
     at: lamp.getWorldPosition(new Vector3()),
@@ -80,7 +82,7 @@ function shines(mesh: Mesh): boolean {
 function someTriangles(mesh: Mesh): LampPoint[] {
   const { index, attributes } = mesh.geometry;
   const position = attributes['position']!;
-  const count = Math.floor((index?.count ?? position.count) / 3);
+  const count = trianglesOf(mesh.geometry);
   const triangle = new Triangle();
   return Array.from({ length: Math.min(count, MOST_LAMP_POINTS) }, (_, i, of = Math.min(count, MOST_LAMP_POINTS)) => {
     const first = 3 * Math.floor(((i + 0.5) * count) / of);
@@ -96,7 +98,7 @@ function someTriangles(mesh: Mesh): LampPoint[] {
   });
 }
 
-/** What is seen, and what stands in the way of light, from both of its sides. */
+/** Finds what a view sees, and where surfaces stand in the way of light. */
 class Room {
   private readonly tree: RayTree;
   private readonly size: number;
@@ -106,13 +108,11 @@ class Room {
     this.size = scene.bounds.getSize(new Vector3()).length();
   }
 
-  /** Of what a camera sees: how much has a lamp in sight, or is one. */
+  /** The part of a view that a lamp shines on, or that is a lamp. */
   litShare(lamps: readonly LampPoint[], camera: PerspectiveCamera): number {
     let [seen, lit] = [0, 0];
     for (let i = 1; i <= RAYS; ++i) {
-      // Evenly spread for every number of rays (the R2 sequence of Martin Roberts, 2018).
-      const [x, y] = [2 * ((i * 0.7548776662466927) % 1) - 1, 2 * ((i * 0.5698402909980532) % 1) - 1];
-      const ahead = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
+      const ahead = new Vector3(...spreadPoint(i), 0.5).unproject(camera).sub(camera.position).normalize();
       const hit = this.tree.cast(camera.position, ahead, 'drawn', NEAR * this.size);
       if (!hit) continue;
       ++seen;
@@ -122,7 +122,7 @@ class Room {
     return seen === 0 ? 0 : lit / seen;
   }
 
-  /** Below a lamp, where one stands: from one end of what is seen there to the other. Undefined: there is no floor. */
+  /** The longest line of sight at eye height below a lamp. Undefined: there is no floor. */
   longestView({ at, facing }: LampPoint): Place | undefined {
     const start = at.clone().addScaledVector(facing ?? DOWN, 2 * NEAR * this.size);
     const height = this.reach(start, DOWN, this.size);
@@ -133,7 +133,7 @@ class Room {
       const angle = (2 * Math.PI * (i + 0.5)) / DIRECTIONS;
       const ahead = new Vector3(Math.sin(angle), 0, Math.cos(angle));
       const back = this.reach(middle, ahead.clone().negate(), this.size);
-      if (back >= this.size) continue; // there is no wall to stand at
+      if (back >= this.size) continue; // there is no wall behind
       const eye = middle.clone().addScaledVector(ahead, -BACK * back);
       const target = middle.clone().addScaledVector(ahead, this.reach(middle, ahead, this.size) / 2);
       if (!best || eye.distanceTo(target) > best.eye.distanceTo(best.target)) best = { eye, target };
@@ -148,7 +148,7 @@ class Room {
     return this.reach(point, way.divideScalar(distance), distance) > distance * 0.99;
   }
 
-  /** How far one gets, metres, `most` at most. What can be seen through stops nothing. */
+  /** Distance to the next surface in metres, at most `most`. Transparent surfaces do not count. */
   private reach(from: Vector3, direction: Vector3, most: number): number {
     return this.tree.cast(from, direction, 'solid', NEAR * this.size, most)?.distance ?? most;
   }

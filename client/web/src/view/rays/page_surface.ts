@@ -1,5 +1,4 @@
-// Which surface's light lies at a place of a lightmap page, or that none does: pages are flat, and the scene is not drawn
-// where they are looked at.
+// Finds the surface at a place of a lightmap page.
 
 import { type BufferAttribute, type BufferGeometry, type Intersection, Mesh, Triangle, Vector2, Vector3 } from 'three';
 import type { LightmapPage } from '../light/lightmap_page';
@@ -12,7 +11,9 @@ interface Box {
 
 const boxes = new WeakMap<BufferGeometry, Box>();
 
-/** Undefined: between the charts, or on that of something hidden. The first of the scene where a file's own charts overlap. */
+/**
+ * Undefined: the place is between charts, or of a hidden object. Where charts overlap, the first surface of the scene.
+ */
 export function surfaceAt(scene: LitScene, page: LightmapPage, at: Vector2): Intersection | undefined {
   let found: Intersection | undefined;
   scene.root.traverseVisible((object) => {

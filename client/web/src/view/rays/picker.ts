@@ -1,4 +1,4 @@
-// What lies under the pointer: the object to select, and the light that falls there.
+// Finds the object and the light under the pointer.
 
 import { Mesh, Raycaster, Vector2, type Vector3, type Intersection, type PerspectiveCamera } from 'three';
 import { luminance } from '../../page/colours';
@@ -9,11 +9,11 @@ import type { LitScene } from '../scene/lit_scene';
 export interface Reading {
   /** Metres; undefined in a gap. */
   point: Vector3 | undefined;
-  /** Irradiance, lux: linear R, G, B; undefined: no light is known there. */
+  /** Irradiance in lux, linear R, G, B; undefined: no light is known. */
   irradiance: [number, number, number] | undefined;
-  /** Of a page: between the charts, where light falls on nothing. */
+  /** The place is between the charts of a page, where there is no surface. */
   isGap?: boolean;
-  /** Its estimated error, lux, luminance; undefined where the server does not stream it. */
+  /** Its standard error (lux, luminance); undefined: the server does not stream errors. */
   error: number | undefined;
   /** Light that leaves, lm/m^2, luminance; undefined where it differs within the surface. */
   radiosity: number | undefined;
@@ -25,7 +25,7 @@ export interface Reading {
 
 const caster = new Raycaster();
 
-/** The object to select, a lamp's sign included. `x`, `y`: normalised device coordinates. */
+/** The object to select, which may be the sign of a lamp. `x`, `y`: normalised device coordinates. */
 export function pick(scene: LitScene, camera: PerspectiveCamera, x: number, y: number): Intersection | undefined {
   return hits(scene, camera, x, y)[0];
 }
@@ -35,7 +35,7 @@ function shown(object: Mesh): boolean {
   return true;
 }
 
-/** The nearest surface: signs of lamps hide none of the light. */
+/** The nearest surface. Signs of lamps hide no light. */
 export function pickSurface(
   scene: LitScene,
   camera: PerspectiveCamera,

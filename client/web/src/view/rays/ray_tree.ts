@@ -1,20 +1,23 @@
-// The shown surfaces for rays: finds what a ray meets in time that hardly grows with the number of triangles. A snapshot
-// of where all is, in world space.
+// A tree of bounding boxes over the shown surfaces, in which a ray finds its hit in time that hardly grows with the
+// number of triangles. A snapshot, in world space.
 
 import { DoubleSide, Mesh, Vector3 } from 'three';
 import { LitMaterial } from '../scene/lit_material';
 import type { LitScene } from '../scene/lit_scene';
+import { trianglesOf } from '../scene/object_box';
 
 export interface RayHit {
   distance: number;
   mesh: Mesh<Mesh['geometry'], LitMaterial>;
-  /** Of unit length, on the side that the ray comes from. */
+  /** Of unit length, towards the origin of the ray. */
   normal: Vector3;
   /** Index of the triangle in the tree. */
   triangle: number;
 }
 
-/** What rays are stopped by. `drawn`: what one sees; `solid`: what light does not go through, from either side. */
+/**
+ * The faces that stop rays. `drawn`: those that a camera sees. `solid`: those that light does not pass, from any side.
+ */
 export type Stops = 'drawn' | 'solid';
 
 const LEAF_TRIANGLES = 4;
@@ -24,19 +27,19 @@ const MOST_DEPTH = 64;
 type LitMesh = RayHit['mesh'];
 
 export class RayTree {
-  /** Nine numbers each, corner after corner. */
+  /** Corners of the triangles, nine numbers each. */
   private readonly corners: Float64Array;
-  /** Of the triangles. */
+  /** Middles of the triangles. */
   private readonly middles: Float64Array;
   private readonly meshes: LitMesh[] = [];
   private readonly meshOf: Uint32Array;
-  /** Triangles as the leaves have them. */
+  /** Triangles in the order of the leaves. */
   private readonly order: Uint32Array;
   /** Lowest and highest corner of each node. */
   private readonly boxes: number[] = [];
-  /** Of a leaf: its first triangle in `order`; of an inner node: its left child, which the right one follows. */
+  /** A leaf's first triangle in `order`, or an inner node's left child, which the right one follows. */
   private readonly first: number[] = [];
-  /** Of a leaf: its triangles; of an inner node: 0. */
+  /** Number of a leaf's triangles; 0: an inner node. */
   private readonly count: number[] = [];
 
   constructor(scene: LitScene) {
@@ -44,13 +47,13 @@ export class RayTree {
     scene.root.traverseVisible((object) => {
       if (object instanceof Mesh && object.material instanceof LitMaterial) this.meshes.push(object as LitMesh);
     });
-    const triangles = this.meshes.reduce((sum, mesh) => sum + trianglesOf(mesh), 0);
+    const triangles = this.meshes.reduce((sum, mesh) => sum + trianglesOf(mesh.geometry), 0);
     this.corners = new Float64Array(9 * triangles);
     this.meshOf = new Uint32Array(triangles);
     let at = 0;
     this.meshes.forEach((mesh, index) => {
       this.take(mesh, at);
-      this.meshOf.fill(index, at, (at += trianglesOf(mesh)));
+      this.meshOf.fill(index, at, (at += trianglesOf(mesh.geometry)));
     });
     this.middles = Float64Array.from({ length: 3 * triangles }, (_, i) => {
       const corner = 9 * Math.floor(i / 3) + (i % 3);
@@ -60,7 +63,7 @@ export class RayTree {
     this.build();
   }
 
-  /** The nearest, farther away than `least` and at most `most`; `direction` of any length, which counts as one. */
+  /** The nearest hit between `least` and `most`. Distances are multiples of the length of `direction`. */
   cast(from: Vector3, direction: Vector3, stops: Stops, least: number, most = Infinity): RayHit | undefined {
     const [o, d] = [from.toArray(), direction.toArray()];
     const inverse = d.map((v) => 1 / v);
@@ -92,13 +95,13 @@ export class RayTree {
     return b!.sub(a!).cross(c!.sub(a!)).normalize();
   }
 
-  /** Corners of a mesh from triangle `at` on, in such an order that one sees its front counter-clockwise. */
+  /** Stores a mesh's corners from triangle `at` on, counter-clockwise as seen from the front. */
   private take(mesh: LitMesh, at: number): void {
     const { index, attributes } = mesh.geometry;
     const position = attributes['position']!;
     const mirrored = mesh.matrixWorld.determinant() < 0;
     const corner = new Vector3();
-    for (let i = 0; i < 3 * trianglesOf(mesh); ++i) {
+    for (let i = 0; i < 3 * trianglesOf(mesh.geometry); ++i) {
       const of = mirrored ? i - (i % 3) + [0, 2, 1][i % 3]! : i;
       corner.fromBufferAttribute(position, index ? index.getX(of) : of).applyMatrix4(mesh.matrixWorld);
       corner.toArray(this.corners, 9 * at + 3 * i);
@@ -129,7 +132,7 @@ export class RayTree {
     return this.first.length - 1;
   }
 
-  /** Sets a node's box. Returns that of its triangles' middles, as lowest and highest corner. */
+  /** Sets a node's box. Returns the box of its triangles' middles, as lowest and highest corner. */
   private bound(node: number, first: number, count: number): number[] {
     const { boxes, corners, middles, order } = this;
     const around = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
@@ -149,7 +152,9 @@ export class RayTree {
     return around;
   }
 
-  /** Puts triangles of the lower half of the longest side first. Returns how many; 0: they are all in one place. */
+  /**
+   * Halves the longest side, and puts the triangles of the lower half first. Returns their number; 0: no side is long.
+   */
   private divide(first: number, count: number, around: readonly number[]): number {
     const sizes = [0, 1, 2].map((axis) => around[axis + 3]! - around[axis]!);
     const axis = sizes.indexOf(Math.max(...sizes));
@@ -171,7 +176,7 @@ export class RayTree {
     for (let axis = 0; axis < 3; ++axis) {
       const a = (this.boxes[NODE_NUMBERS * node + axis]! - o[axis]!) * inverse[axis]!;
       const b = (this.boxes[NODE_NUMBERS * node + 3 + axis]! - o[axis]!) * inverse[axis]!;
-      if (a !== a || b !== b) continue; // along a side of the box
+      if (a !== a || b !== b) continue; // the ray runs within a side of the box
       near = Math.max(near, Math.min(a, b));
       far = Math.min(far, Math.max(a, b));
     }
@@ -179,11 +184,7 @@ export class RayTree {
   }
 }
 
-function trianglesOf({ geometry: { index, attributes } }: LitMesh): number {
-  return Math.floor((index?.count ?? attributes['position']!.count) / 3);
-}
-
-/** Möller and Trumbore, 1997. How far the triangle is, or NaN, and above 0 where one sees its front. */
+/** Möller and Trumbore, 1997. Distance to the triangle, or NaN; and a number above 0 where the ray meets its front. */
 function meet(p: Float64Array, at: number, o: readonly number[], d: readonly number[]): [number, number] {
   const [ax, ay, az] = [p[at]!, p[at + 1]!, p[at + 2]!];
   const [e1x, e1y, e1z] = [p[at + 3]! - ax, p[at + 4]! - ay, p[at + 5]! - az];

@@ -1,4 +1,5 @@
-// The sign of a light that has no surface: a small ball in its colour, with a ring; spot and sun also show where to.
+// The sign of a light without a surface: a small ball in its colour, with a ring. Spots and suns also show their
+// direction.
 
 import {
   BufferGeometry,
@@ -28,7 +29,7 @@ export class LampMarker extends Object3D {
   private readonly ball = new Mesh(BALL, new MeshBasicMaterial({ toneMapped: false }));
   private readonly line = new LineBasicMaterial({ toneMapped: false });
   private readonly ray = new Line(RAY, this.line);
-  /** It shines from far away, in the direction of the negative Z axis. */
+  /** The light comes from far away, in the direction of the negative Z axis. */
   isSun = false;
 
   constructor(readonly node: number) {

@@ -1,5 +1,6 @@
-// Layouts of lightmaps: the shown layout, the next layout, which collects its geometry and light in the background, and the
-// pages of the quantity that is shown besides irradiance. Decides when the next layout is ready; the viewer shows it.
+// Layouts of lightmaps: the shown layout, the next layout, which collects its geometry and light in the background, and
+// the pages of the quantity that is shown besides irradiance. Decides when the next layout is ready; the viewer shows
+// it.
 
 import type { WebGLRenderer } from 'three';
 import type { Gltf } from '../../document/gltf';
@@ -55,7 +56,9 @@ export class Layouts {
     return this.staged?.scene;
   }
 
-  /** The server tells of a layout. Returns its pages, whose geometry is to be fetched; undefined: it is no new layout. */
+  /**
+   * The server tells of a layout. Returns its pages, whose geometry is to be fetched; undefined: it is no new layout.
+   */
   expect(note: LightmapsNote): LightmapSet | undefined {
     if (this.isKnown && this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
     this.isKnown = true;

@@ -1,5 +1,5 @@
-// three.js materials lit by lightmap pages, and how an edit of a glTF material reaches them. Every surface is Lambertian
-// with reflectance base colour x (1 - metallic), at most 0.999, as the server has it.
+// three.js materials lit by lightmap pages, and the way of a glTF material's edits to them. As on the server, each
+// surface is Lambertian with reflectance base colour x (1 - metallic), at most 0.999.
 
 import {
   type Color,
@@ -12,15 +12,16 @@ import {
   type Texture,
   Vector2,
   Vector3,
+  type WebGLProgramParametersWithUniforms,
 } from 'three';
 import type { GltfMaterial, GltfTextureInfo, SpecularGlossiness } from '../../document/gltf';
 import type { LightmapPage } from '../light/lightmap_page';
 import { FRAGMENT_PARS, LIGHT_FRAGMENT, OUTPUT_FRAGMENT } from './lit_shader';
 
-/** What is compiled into programs, by its name there. */
+/** Values that are compiled into programs, by their names there. */
 export type Defines = Readonly<Record<'VIEW_MODE' | 'TONE_CURVE' | 'FALSE_COLOUR' | 'WHOLE_PAGES', number>>;
 
-/** What all materials have in common. */
+/** The uniforms that all materials share, and the choice of the programs. */
 export class ViewUniforms {
   readonly all = {
     measuring: { value: false },
@@ -28,12 +29,12 @@ export class ViewUniforms {
     previewLight: { value: 1 },
     toneMappingExposure: { value: 1 },
   };
-  /** Another object whenever something in it is another. */
+  /** A new object whenever a value changes. */
   defines: Defines = { VIEW_MODE: 0, TONE_CURVE: 0, FALSE_COLOUR: 0, WHOLE_PAGES: 0 };
-  /** The same, for pages of which all light is there. */
+  /** The same for pages of which all light is there. */
   wholeDefines: Defines = { ...this.defines, WHOLE_PAGES: 1 };
 
-  /** Materials take it up when they are next refreshed. */
+  /** Materials take the change up when they are next specialised. */
   choose(change: Partial<Omit<Defines, 'WHOLE_PAGES'>>): void {
     const chosen = { ...this.defines, ...change };
     const names = Object.keys(chosen) as (keyof Defines)[];
@@ -43,10 +44,10 @@ export class ViewUniforms {
   }
 }
 
-/** Gives a material the program with these. True: it had another. */
+/** Gives a material the program with these values. True: it had another program. */
 export function specialise(material: Material, defines: Defines): boolean {
   if (material.defines === defines) return false;
-  material.defines = defines; // with those it had before three.js keeps the program, too
+  material.defines = defines; // three.js also keeps the old program for a return to it
   material.needsUpdate = true;
   return true;
 }
@@ -59,14 +60,14 @@ export class LitMaterial extends MeshLambertMaterial {
   };
   page: LightmapPage | undefined;
   dataPage: LightmapPage | undefined;
-  /** The server lights both, be it that a setting says so and not the document. An edit brings another file. */
+  /** The server lights both sides, because of the document or of a setting. A change of either brings new geometry. */
   private readonly bothSides: boolean;
 
   constructor(
     source: Material,
     private readonly view: ViewUniforms,
     page: LightmapPage | undefined,
-    /** False: its emissive texture is black wherever it is on these faces. */
+    /** False: the emissive texture is black on all of these faces. */
     private readonly emits = true,
   ) {
     super();
@@ -94,29 +95,32 @@ export class LitMaterial extends MeshLambertMaterial {
     this.specularMap = specular ? specular.map : from.metalnessMap;
     this.own.mirrored.value.set(...(specular?.factor ?? ([0, 0, from.metalness ?? 0] as const)));
     this.setPage(page);
-    this.onBeforeCompile = (shader) => {
-      Object.assign(shader.uniforms, view.all, this.own, this.page?.uniforms ?? noPage());
-      shader.fragmentShader = shader.fragmentShader
-        .replace('#include <lights_lambert_pars_fragment>', (chunk) => chunk + FRAGMENT_PARS)
-        .replace('#include <lights_lambert_fragment>', (chunk) => REFLECTANCE + chunk)
-        .replace('#include <lights_fragment_maps>', LIGHT_FRAGMENT)
-        .replace('#include <opaque_fragment>', OUTPUT_FRAGMENT)
-        .replace('#include <tonemapping_fragment>', '')
-        .replace('#include <colorspace_fragment>', '');
-    };
+    this.onBeforeCompile = (shader) => this.extend(shader);
   }
 
-  /** One program for all of them: what differs is in defines that three.js knows of. */
+  /** Turns three.js's Lambert program into one that is lit by pages. */
+  private extend(shader: WebGLProgramParametersWithUniforms): void {
+    Object.assign(shader.uniforms, this.view.all, this.own, this.page?.uniforms ?? noPage());
+    shader.fragmentShader = shader.fragmentShader
+      .replace('#include <lights_lambert_pars_fragment>', (chunk) => chunk + FRAGMENT_PARS)
+      .replace('#include <lights_lambert_fragment>', (chunk) => REFLECTANCE + chunk)
+      .replace('#include <lights_fragment_maps>', LIGHT_FRAGMENT)
+      .replace('#include <opaque_fragment>', OUTPUT_FRAGMENT)
+      .replace('#include <tonemapping_fragment>', '')
+      .replace('#include <colorspace_fragment>', '');
+  }
+
+  /** All materials share programs: three.js knows of the defines in which they differ. */
   override customProgramCacheKey(): string {
     return 'radiosity';
   }
 
-  /** For the view that is chosen now, and pages that are whole or not. True: it had the program of another. */
+  /** Takes the program of the present view. True: the material had another program. */
   specialise(whole: boolean): boolean {
     return specialise(this, whole ? this.view.wholeDefines : this.view.defines);
   }
 
-  /** The page's scale may have grown since the last frame. */
+  /** The scale of the page may have changed since the last frame. */
   refresh(): void {
     if (this.page) this.lightMapIntensity = this.page.scale;
     this.own.dataScale.value = this.dataPage?.scale ?? 0;
@@ -124,10 +128,10 @@ export class LitMaterial extends MeshLambertMaterial {
 
   setDataPage(page: LightmapPage | undefined): void {
     this.dataPage = page;
-    this.own.dataPage.value = page?.texture ?? null; // light is no data: without any there is nothing to see
+    this.own.dataPage.value = page?.texture ?? null; // without data there is nothing to see, as light is no data
   }
 
-  /** All of a surface looks the same but for its light. */
+  /** A surface looks the same everywhere, apart from its light. */
   get isPlain(): boolean {
     return (
       !this.map &&
@@ -139,7 +143,7 @@ export class LitMaterial extends MeshLambertMaterial {
     );
   }
 
-  /** It neither reflects nor emits light, as a metal that is seen by its mirror images alone. */
+  /** It neither reflects light diffusely nor emits any, as a metal. */
   get isBlack(): boolean {
     const { color, emissive, emissiveIntensity: strength } = this;
     const most = (c: Color) => Math.max(c.r, c.g, c.b);
@@ -147,7 +151,7 @@ export class LitMaterial extends MeshLambertMaterial {
     return most(color) * diffuse < 1e-4 && most(emissive) * strength === 0;
   }
 
-  /** Of a plain surface, in nits, as the program has it; irradiance in lux. */
+  /** Radiance of a plain surface in nits, as the shader computes it; `irradiance` in lux. */
   radianceOf(irradiance: readonly [number, number, number]): [number, number, number] {
     const rho = (c: number) => Math.min(0.999, c * this.diffuseShare) / Math.PI;
     const { color, emissive, emissiveIntensity: strength } = this;
@@ -158,7 +162,7 @@ export class LitMaterial extends MeshLambertMaterial {
     ];
   }
 
-  /** Takes on what an edit may change. */
+  /** Takes the members that an edit may have changed. */
   edit(gltf: GltfMaterial): void {
     const pbr = gltf.pbrMetallicRoughness ?? {};
     const gloss = gltf.extensions?.KHR_materials_pbrSpecularGlossiness;
@@ -172,7 +176,7 @@ export class LitMaterial extends MeshLambertMaterial {
     this.emissive.setRGB(...(gltf.emissiveFactor ?? [0, 0, 0]));
     this.emissiveIntensity = gltf.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     this.comeBefore();
-    // What has a page is there once for each side that is seen; another choice of sides comes with geometry of its own.
+    // A surface with a page has faces for each lit side; a change of sides brings new geometry.
     const side = (gltf.doubleSided || this.bothSides) && !this.page ? DoubleSide : FrontSide;
     if (side !== this.side) {
       this.side = side;
@@ -180,14 +184,14 @@ export class LitMaterial extends MeshLambertMaterial {
     }
   }
 
-  /** Of faces that lie on each other the one that emits is seen, as the server lights them. */
+  /** Where faces lie on each other, the one that emits is seen, as on the server. */
   private comeBefore(): void {
     const { emissive, emissiveIntensity } = this;
     this.polygonOffset = this.emits && Math.max(emissive.r, emissive.g, emissive.b) * emissiveIntensity > 0;
     this.polygonOffsetFactor = this.polygonOffsetUnits = -1;
   }
 
-  /** Where no texture says otherwise. */
+  /** Part of the light that is reflected diffusely, unless a texture reduces it. */
   private get diffuseShare(): number {
     return 1 - Math.max(...this.own.mirrored.value.toArray());
   }
@@ -198,7 +202,7 @@ export class LitMaterial extends MeshLambertMaterial {
     this.refresh();
   }
 
-  /** What the server lets through by chance is half seen through here. */
+  /** A transmissive surface, through which the server lets light pass at random, is drawn half transparent. */
   private applyTransmission(from: MeshStandardMaterial & { transmission?: number }): void {
     if (!from.transmission) return;
     this.transparent = true;
@@ -207,7 +211,7 @@ export class LitMaterial extends MeshLambertMaterial {
   }
 }
 
-/** The texture that three.js takes for the strength of reflections is the metallic one here, or the specular one. */
+/** three.js's specular map is the metallic or the specular texture here. */
 const REFLECTANCE = `
   vec3 mirror = mirrored;
   #ifdef USE_SPECULARMAP
@@ -226,14 +230,14 @@ function noPage() {
   };
 }
 
-/** In a material's userData: what KHR_materials_pbrSpecularGlossiness says of it, which three.js does not read. */
+/** Member of a material's userData for KHR_materials_pbrSpecularGlossiness, which three.js does not read. */
 const SPECULAR = 'specular';
 interface Specular {
   factor: readonly [number, number, number];
   map: Texture | null;
 }
 
-/** Gives a material that three.js read without the extension the colours that it has by it. */
+/** Gives a material the colours of the extension, which three.js has ignored. */
 export async function readSpecularGlossiness(
   material: MeshStandardMaterial,
   gloss: SpecularGlossiness,
@@ -247,7 +251,7 @@ export async function readSpecularGlossiness(
   material.userData[SPECULAR] = { factor: gloss.specularFactor ?? [1, 1, 1], map } satisfies Specular;
 }
 
-/** Albedo pictures stay sharp at a slant. */
+/** Keeps textures sharp at a slant. */
 export function sharpen(material: Material, anisotropy: number): void {
   const { map, emissiveMap } = material as MeshLambertMaterial;
   for (const texture of [map, emissiveMap]) {

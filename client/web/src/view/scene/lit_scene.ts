@@ -1,5 +1,5 @@
-// The scene's geometry as three.js objects, lit by a set of pages, with the way back from objects to the glTF document.
-// One for each layout of the lightmaps.
+// The geometry of one lightmap layout as three.js objects, lit by its pages. Knows which node and which material of the
+// document each object belongs to.
 
 import {
   Box3,
@@ -20,6 +20,7 @@ import { lightOf, type Gltf, type GltfNode, type GltfTextureInfo, type SpecularG
 import { LampMarker } from './lamp_marker';
 import { LitMaterial, readSpecularGlossiness, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from '../light/lightmap_set';
+import { trianglesOf } from './object_box';
 
 interface Association {
   nodes?: number;
@@ -28,13 +29,13 @@ interface Association {
 
 export class LitScene {
   readonly root = new Group();
-  /** The document that it was made of. */
+  /** The document of the GLB that the scene was made from. */
   readonly source: Gltf;
   readonly nodes = new Map<number, Object3D>();
   readonly lamps = new Map<number, LampMarker>();
   readonly cameras: { name: string; camera: PerspectiveCamera }[] = [];
   triangles = 0;
-  /** Its materials have the programs for pages of which all light is there. */
+  /** The materials have programs for pages of which all light is there. */
   showsWhole = false;
   private readonly materials = new Map<number, LitMaterial[]>();
   private readonly made = new Map<string, LitMaterial>();
@@ -42,7 +43,7 @@ export class LitScene {
   private readonly textures = new Set<Texture>();
   private readonly nodeNumbers = new Map<Object3D, number>();
 
-  /** Reads a GLB from /scene.glb. Rejects when it cannot be drawn. */
+  /** Reads a GLB of /scene.glb. Rejects when it cannot be drawn. */
   static async load(glb: ArrayBuffer, set: LightmapSet, view: ViewUniforms, anisotropy: number): Promise<LitScene> {
     const gltf = await new GLTFLoader().parseAsync(glb, '');
     await readAllSpecularGlossiness(gltf);
@@ -81,14 +82,14 @@ export class LitScene {
     return box;
   }
 
-  /** Puts all of the document's state onto the objects. */
+  /** Brings all objects up to date with the document. */
   applyDocument(gltf: Gltf): void {
     for (const node of this.nodes.keys()) this.applyNode(gltf, node);
     for (const material of this.materials.keys()) this.applyMaterial(gltf, material);
     this.placeLamps(gltf);
   }
 
-  /** Puts edited members onto the objects: JSON pointers, names allowed. */
+  /** Brings the objects of edited members up to date: JSON pointers, which may contain names; none: all. */
   applyPointers(gltf: Gltf, pointers: string[]): void {
     if (pointers.length === 0) return this.applyDocument(gltf);
     for (const pointer of pointers) {
@@ -102,7 +103,7 @@ export class LitScene {
     this.placeLamps(gltf);
   }
 
-  /** The node that an object of the scene belongs to. */
+  /** The node that an object belongs to. */
   nodeOf(object: Object3D): number | undefined {
     for (let at: Object3D | null = object; at; at = at.parent) {
       if (at instanceof LampMarker) return at.node;
@@ -117,7 +118,7 @@ export class LitScene {
     return index;
   }
 
-  /** None of its surfaces can be seen by the light they reflect or emit. */
+  /** No surface reflects light diffusely or emits any. */
   get isBlack(): boolean {
     return this.made.size > 0 && [...this.made.values()].every((material) => material.isBlack);
   }
@@ -126,7 +127,7 @@ export class LitScene {
     for (const material of this.made.values()) visit(material);
   }
 
-  /** For the view that is chosen now. True: some materials had the programs of another. */
+  /** Takes the programs of the present view. True: some materials had others. */
   specialise(whole = this.showsWhole): boolean {
     let differed = false;
     this.eachMaterial((material) => (differed = material.specialise(whole) || differed));
@@ -145,7 +146,7 @@ export class LitScene {
     this.root.removeFromParent();
   }
 
-  /** Its light is in the pages already: an empty object takes its place. */
+  /** Replaces a light, which the pages contain already, by an empty object. */
   private putOut(light: Object3D): void {
     const empty = new Group();
     empty.name = light.name;
@@ -183,7 +184,7 @@ export class LitScene {
     mesh.userData['materialIndex'] = index;
     mesh.userData['page'] = page;
     this.geometries.add(geometry);
-    this.triangles += (geometry.index?.count ?? geometry.getAttribute('position').count) / 3;
+    this.triangles += trianglesOf(geometry);
   }
 
   private applyNode(gltf: Gltf, index: number): void {
@@ -199,7 +200,7 @@ export class LitScene {
     if (material) for (const lit of this.materials.get(index) ?? []) lit.edit(material);
   }
 
-  /** Lights have no surface to be seen by: each gets a small sign that can be picked and dragged. */
+  /** Lights without a surface get a small sign that can be picked and dragged. */
   private placeLamps(gltf: Gltf): void {
     const hanging = new Set(this.hangingLights(gltf));
     for (const [node, marker] of this.lamps) {
@@ -216,7 +217,7 @@ export class LitScene {
         this.lamps.set(node, marker);
       }
       if (marker.parent !== parent) parent.add(marker);
-      // A lamp that the geometry does not know yet hangs in the root, where new lamps are put.
+      // A new lamp that the geometry does not contain yet hangs in the root.
       if (parent === this.root) place(marker, gltf.nodes?.[node] ?? {});
       marker.display(lightOf(gltf, node)!.light, size);
     }

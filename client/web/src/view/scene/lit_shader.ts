@@ -1,20 +1,20 @@
-// GLSL that turns a three.js Lambert material into one lit by pages of irradiance, with all the views of the scene.
-// Each view and tone curve has a program of its own (ViewUniforms.defines): one for all of them took three times as long
-// for every pixel where software draws, which goes both ways of every branch. The exposure meter shares them.
+// GLSL that turns a three.js Lambert material into one that is lit by pages of irradiance, with all views of the scene.
+// Each view and tone curve has its own program (ViewUniforms.defines): one program for all of them took three times as
+// long a pixel in software, which takes both ways of each branch. The exposure meter uses the same programs.
 
 import { ShaderChunk } from 'three';
 import { glslList, MIP_STOPS, paletteGlsl } from '../looks/palette';
 
-/** Pages: a tile's finest mip that has come is in `pageResident`, one texel for 64 x 64 of the page, 255 for none. */
+/** Pages. `pageResident` holds the finest mip that has come for each tile of 64 x 64 texels; 255: none. */
 const PAGE_PARS = `
 uniform sampler2D pageResident;
 uniform vec2 pageSize;
 uniform float pageTiles;
-uniform bool pageLightShown;  // false: nothing has shone yet, or it is not known how brightly to show it
+uniform bool pageLightShown;  // false: there is no light yet, or its exposure is unknown
 uniform bool measuring;       // linear radiance for the exposure meter
 const float kNothing = 15.5;
 
-// The finest mip that all four texels of a bilinear lookup have.
+// The finest mip that has come for all four texels of a bilinear lookup.
 float residentMip(vec2 uv) {
   if (!pageLightShown && !measuring) return 255.0;
   vec2 texel = 0.75 / pageSize, tiles = pageSize / pageTiles;
@@ -26,9 +26,9 @@ float residentMip(vec2 uv) {
   return mip;
 }
 
-// Charts lie two texels apart: beyond mip 1 they run into each other, so that is how far minification may go.
+// Charts lie two texels apart and mix beyond mip 1, so minification ends there.
 float lookupMip(vec2 uv, out float resident) {
-  #if WHOLE_PAGES == 1  // nothing to look up: a third of a frame, where software draws
+  #if WHOLE_PAGES == 1  // without the lookup, which takes a third of a frame in software
     resident = 0.0;
   #else
     resident = residentMip(uv);
@@ -59,8 +59,8 @@ vec3 toneMapped(vec3 radiance) {
   #endif
 }
 
-// Half a step of the screen's 256, up or down, so that light that fades over a wall ends in no bands. The pattern is
-// interleaved gradient noise (Jimenez, Next Generation Post Processing in Call of Duty, 2014), the same in every frame.
+// Up to half a step of the screen's 256, so that fading light shows no bands. Interleaved gradient noise (Jimenez, Next
+// Generation Post Processing in Call of Duty, 2014), the same in each frame.
 vec3 dither() {
   float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
   return (fract(noise + vec3(0.0, 1.0, 2.0) / 3.0) - 0.5) / 255.0;
@@ -70,8 +70,8 @@ vec3 displayed(vec3 radiance) { return encodeSrgb(toneMapped(radiance)) + dither
 
 const VIEW_PARS = `
 // VIEW_MODE: ViewMode.number; FALSE_COLOUR: 0 or 1
-uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
-uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
+uniform vec2 falseRange;     // lowest and highest value of the logarithmic scale
+uniform float previewLight;  // irradiance of surfaces that no light has come for
 ${paletteGlsl()}
 ${DISPLAY_PARS}
 
@@ -89,8 +89,7 @@ vec3 mipColour(float mip) {
   return mix(colours[int(at)], colours[int(at) + 1], fract(at));
 }
 
-// Every texel its own tint, with a line around it, each where it is large enough on the screen: smaller, they would be
-// dots and moire.
+// Each texel has a tint and a line around it, where it is large enough on the screen to show no dots and moire.
 vec3 patchColour(vec2 uv, vec3 shade) {
   vec2 at = uv * pageSize;
   uvec2 id = uvec2(at);
@@ -110,12 +109,12 @@ export const FRAGMENT_PARS = `
   uniform sampler2D dataPage;
   uniform float dataScale;
 #endif
-uniform vec3 mirrored;  // what is not reflected diffusely: (0, 0, metallic), or the specular factor
+uniform vec3 mirrored;  // the part that is not reflected diffusely: (0, 0, metallic), or the specular factor
 ${PAGE_PARS}
 ${VIEW_PARS}
 `;
 
-/** Instead of lights_fragment_maps: irradiance of the page, or light from the viewer as long as there is none. */
+/** Replaces lights_fragment_maps: the page's irradiance, or light from the viewer until there is some. */
 export const LIGHT_FRAGMENT = `
   vec3 pageIrradiance = vec3(0.0);
   float pageMip = 99.0;
@@ -128,7 +127,7 @@ export const LIGHT_FRAGMENT = `
   irradiance += pageIrradiance;
 `;
 
-/** Instead of opaque, tone mapping and colour space chunks. */
+/** Replaces the chunks for opacity, tone mapping and colour space. */
 export const OUTPUT_FRAGMENT = `
   #ifdef OPAQUE
     diffuseColor.a = 1.0;
@@ -153,7 +152,7 @@ export const OUTPUT_FRAGMENT = `
     #endif
   #elif VIEW_MODE == 5
     #ifdef USE_LIGHTMAP
-      // Tints and lines take light away.
+      // Makes up for the light that tints and lines take away.
       shade = patchColour(vLightMapUv, displayed(1.6 * shownLight));
     #endif
   #elif VIEW_MODE == 6
@@ -161,12 +160,12 @@ export const OUTPUT_FRAGMENT = `
   #elif VIEW_MODE == 7
     shade = inverseTransformDirection(normal, viewMatrix) * 0.5 + 0.5;
   #else
-    shade = encodeSrgb(diffuseColor.rgb) * (0.82 + 0.18 * abs(normal.z)); // white before white has edges
+    shade = encodeSrgb(diffuseColor.rgb) * (0.82 + 0.18 * abs(normal.z)); // shades edges between white surfaces
   #endif
   if (measuring) shade = shownLight;
   gl_FragColor = vec4(shade, diffuseColor.a);
   #ifdef USE_LIGHTMAP
-    if (measuring && resident > kNothing) gl_FragColor.a = 0.0; // what nothing is known of is no part of the picture
+    if (measuring && resident > kNothing) gl_FragColor.a = 0.0; // the meter ignores surfaces without light
   #endif
 `;
 
@@ -199,7 +198,7 @@ void main() {
   gl_FragColor = vec4(resident > kNothing ? vec3(0.25) : shade, 1.0);
 }`;
 
-/** Of a triangle that covers the picture: how steeply one looks up there, or down. */
+/** A triangle that covers the picture. `rise`: how steeply the view ray goes up or down. */
 export const SKY_VERTEX = `
 varying float rise;
 void main() {
@@ -208,12 +207,12 @@ void main() {
   gl_Position = vec4(position.xy, 0.0, 1.0);
 }`;
 
-/** Pixels on the horizon show both parts of the sky, as in the server's pictures. */
+/** Pixels on the horizon mix both parts of the sky, as in the server's pictures. */
 export const SKY_FRAGMENT = `
 #include <common>
 varying float rise;
 uniform vec3 skyUpper, skyLower;  // nits
-uniform bool measuring;           // the sky is no part of what the picture is exposed for
+uniform bool measuring;           // the exposure does not depend on the sky
 ${DISPLAY_PARS}
 void main() {
   float above = clamp(0.5 + rise / max(length(vec2(dFdx(rise), dFdy(rise))), 1e-9), 0.0, 1.0);

@@ -1,17 +1,28 @@
-// The box around what an object is made of: its surfaces. The signs of lamps are none; of a lamp the place is what counts.
+// The surfaces of an object, and the box around them. The sign of a lamp is no surface.
 
 import { Box3, Mesh, type BufferGeometry, type Object3D } from 'three';
 import { LampMarker } from './lamp_marker';
 
-/** In metres of the scene; empty where an object has no surface. */
+/** The meshes of an object, without the signs of lamps. */
+export function surfacesOf(object: Object3D): Mesh<BufferGeometry>[] {
+  const surfaces: Mesh<BufferGeometry>[] = [];
+  object.traverse((child) => {
+    if (child instanceof Mesh && !(child.parent instanceof LampMarker)) surfaces.push(child as Mesh<BufferGeometry>);
+  });
+  return surfaces;
+}
+
+export function trianglesOf({ index, attributes }: BufferGeometry): number {
+  return Math.floor((index?.count ?? attributes['position']!.count) / 3);
+}
+
+/** In metres of the scene; empty if the object has no surface. */
 export function surfaceBox(object: Object3D): Box3 {
   const box = new Box3();
   object.updateWorldMatrix(true, true);
-  object.traverse((child) => {
-    if (!(child instanceof Mesh) || child.parent instanceof LampMarker) return;
-    const geometry = child.geometry as BufferGeometry;
+  for (const { geometry, matrixWorld } of surfacesOf(object)) {
     if (!geometry.boundingBox) geometry.computeBoundingBox();
-    box.union(geometry.boundingBox!.clone().applyMatrix4(child.matrixWorld));
-  });
+    box.union(geometry.boundingBox!.clone().applyMatrix4(matrixWorld));
+  }
   return box;
 }

@@ -1,5 +1,6 @@
-// The scene's GLSL programs, which the driver compiles while the page goes on. A scene of which all light has arrived gets
-// programs that need not look up, for each pixel, which light is there: they are made while the picture is at rest.
+// The scene's GLSL programs, which the driver compiles while the page goes on. A scene of which all light has arrived
+// gets programs that need not look up, for each pixel, which light is there: they are made while the picture is at
+// rest.
 
 import type { Camera, Scene, WebGLRenderer } from 'three';
 import { pause } from '../../page/pause';
@@ -40,8 +41,8 @@ export class Programs {
   }
 
   /**
-   * Makes the programs of the view that is chosen now, where the scene has those of another. Returns whether programs are
-   * being made, so that the last picture must stay; calls `done` when they are there.
+   * Makes the programs of the view that is chosen now, where the scene has those of another. Returns whether programs
+   * are being made, so that the last picture must stay; calls `done` when they are there.
    */
   recompile(scene: LitScene | undefined, done: () => void): boolean {
     if (this.compiling || !scene?.specialise()) return this.compiling;
@@ -54,8 +55,8 @@ export class Programs {
   }
 
   /**
-   * Starts to make the programs for whole pages, in the view that is chosen now. The scene keeps the programs that it has.
-   * Where three.js has such programs already, they are there at once.
+   * Starts to make the programs for whole pages, in the view that is chosen now. The scene keeps the programs that it
+   * has. Where three.js has such programs already, they are there at once.
    */
   makeWhole(scene: LitScene): void {
     scene.specialise(true);

@@ -1,9 +1,9 @@
-// With the WebGL context goes all that three.js has made on the card, but not its listeners: an object that is disposed of
-// later would delete things of a card that is gone, and keep the memory of them until then.
+// When the WebGL context is lost, all that three.js has made on the card is gone, but three.js does not know: objects
+// that are disposed of later would delete things of a lost card, and keep their memory until then.
 
 import { type BufferGeometry, type Material, type Mesh, type Object3D, Texture } from 'three';
 
-/** Has three.js forget what it holds for these objects. Those that are drawn again are made again. */
+/** Makes three.js forget what it has made for these objects. It makes it again when they are drawn again. */
 export function release(root: Object3D): void {
   root.traverse((object) => {
     const { geometry, material } = object as Partial<Mesh>;

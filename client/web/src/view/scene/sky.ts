@@ -1,13 +1,14 @@
-// The sky behind the scene, in the colours of light: a triangle that covers the picture and is drawn before all else.
+// The sky behind the scene: a triangle that covers the picture and is drawn before everything else.
 
 import { BufferGeometry, Float32BufferAttribute, Mesh, type PerspectiveCamera, ShaderMaterial, Vector3 } from 'three';
 import type { Gltf, Vec3 } from '../../document/gltf';
+import { isObject } from '../../document/json_patch';
 import type { Sky } from '../../protocol/messages';
 import { specialise, type ViewUniforms } from './lit_material';
 import { SKY_FRAGMENT, SKY_VERTEX } from './lit_shader';
 import { luminance } from '../../page/colours';
 
-/** That of a document; undefined: it has none, or none that the server would take. */
+/** The sky of a document; undefined: it has none, or none that the server would accept. */
 export function skyOf({ extras }: Gltf): Sky | undefined {
   const sky = isObject(extras) ? extras['radiositySky'] : undefined;
   if (!isObject(sky) || !isRadiance(sky['upper'])) return undefined;
@@ -15,13 +16,9 @@ export function skyOf({ extras }: Gltf): Sky | undefined {
   return isRadiance(lower) ? { upper, lower } : undefined;
 }
 
-/** Undefined: there is none, or a black one. */
+/** Undefined: there is no sky, or a black one. */
 export function shining(sky: Sky | undefined): Sky | undefined {
   return sky && Math.max(...sky.upper, ...sky.lower) > 0 ? sky : undefined;
-}
-
-function isObject(value: unknown): value is Record<string, unknown> {
-  return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
 function isRadiance(value: unknown): value is Vec3 {
@@ -30,9 +27,9 @@ function isRadiance(value: unknown): value is Vec3 {
 
 export class SkyBackground {
   readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
-  /** Of the scene's document. */
+  /** The sky of the scene's document. */
   ofScene: Sky | undefined;
-  /** Of the solve's settings, for scenes that have none of their own. */
+  /** The sky of the solve's settings, for scenes without a sky of their own. */
   ofSettings: Sky | undefined;
   private readonly colours = { skyUpper: { value: new Vector3() }, skyLower: { value: new Vector3() } };
 
@@ -57,7 +54,7 @@ export class SkyBackground {
     return shining(this.ofScene ?? this.ofSettings);
   }
 
-  /** Before each frame. `isShown`: the view shows light that leaves surfaces, in its own colours, and there is some. */
+  /** Before each frame. `isShown`: the view shows the colours of light that leaves surfaces, and there is some. */
   refresh(isShown: boolean): void {
     const { sky } = this;
     this.mesh.visible = isShown && sky !== undefined;
@@ -67,7 +64,7 @@ export class SkyBackground {
     specialise(this.mesh.material, this.view.defines);
   }
 
-  /** Nits, luminance, where a camera sees nothing else. `x`, `y`: normalised device coordinates. */
+  /** Luminance (nits) where a camera sees only the sky. `x`, `y`: normalised device coordinates. */
   luminanceAt(camera: PerspectiveCamera, x: number, y: number): number {
     const { sky } = this;
     if (!sky) return 0;
