@@ -1,6 +1,7 @@
 """The rules of the house that a machine can check: who may include whom, what may lie at the top level, how long a file
 may be, and what must not be left in one. Each rule takes a Tree and yields sentences that name the file and the line."""
 
+import posixpath
 import re
 import subprocess
 from pathlib import Path
@@ -88,6 +89,33 @@ OWN_INCLUDES = [
     ("client/cli/", ["common/", "protocol/", "client/lib/", "client/cli/"]),
 ]
 
+# What a file of the viewer may import of ours: files of its own folder, and of these. The folders are below VIEWER.
+VIEWER = "client/web/src/"
+VIEWER_IMPORTS = {
+    "": {"app", "page"},
+    "app": {"editing", "looking", "protocol", "scenes", "session", "tiles", "ui", "view", "view/light", "view/looks"},
+    "editing": {"document", "protocol", "ui", "view", "view/controls"},
+    "looking": {"document", "page", "protocol", "ui", "view", "view/controls", "view/looks", "view/rays", "view/scene"},
+    "scenes": {"document", "page", "protocol", "ui", "view", "view/light"},
+    "session": {"document", "page", "protocol", "ui", "view", "view/looks"},
+    "ui": {"document", "page", "protocol", "view/looks"},
+    "tiles": {"protocol", "view/light"},
+    "view": {"document", "page", "protocol", "view/controls", "view/exposure", "view/frames", "view/light", "view/looks",
+             "view/rays", "view/scene"},
+    "view/controls": {"document", "page", "protocol", "view/light", "view/rays", "view/scene"},
+    "view/exposure": {"page", "protocol", "view/looks", "view/rays", "view/scene"},
+    "view/rays": {"page", "view/light", "view/scene"},
+    "view/scene": {"document", "page", "protocol", "view/light", "view/looks"},
+    "view/light": {"page", "protocol"},
+    "view/frames": set(),
+    "view/looks": set(),
+    "document": {"protocol"},
+    "protocol": set(),
+    "page": set(),
+}
+MAX_METHODS = 40
+MAX_MEMBERS = 20
+
 # Libraries that have one home: pattern of the header's name, its name in the message, the folders that may include it.
 LIBRARY_HOMES = [
     (r"(GL|EGL|GLES\d?|KHR|epoxy)/", "OpenGL and EGL headers", ["server/gpu/", "tests/"]),
@@ -101,6 +129,15 @@ LIBRARY_HOMES = [
 ]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+# Imports, exports and workers of TypeScript; also those of types alone, and those that are spread over several lines.
+IMPORT = re.compile(r"""(?:\b(?:from|import)\s*\(?\s*|\bnew\s+URL\(\s*)(['"])(\.{1,2}/[^'"]+|src/[^'"]+)\1""")
+# Of a class as Prettier writes it.
+CLASS = re.compile(r"^(?:export )?(?:default )?(?:abstract )?class (\w+)[^\n]*\{\n(.*?)^\}", re.M | re.S)
+MODIFIERS = r"(?:(?:public|private|protected|static|override|readonly|abstract|async|declare) )*"
+METHOD = re.compile(rf"^  {MODIFIERS}(?:get |set |\*)?(?!constructor\b)[#\w]+(?:<[^\n]*?>)?\(", re.M)
+MEMBER = re.compile(rf"^  {MODIFIERS}[#\w]+[?!]?(?: =|:|;)", re.M)
+CONSTRUCTOR = re.compile(r"^  constructor\((.*?)\) \{", re.M | re.S)
+PARAMETER_MEMBER = re.compile(r"(?:^|[(,\s])(?:(?:public|private|protected|readonly) )+\w+[?:]", re.M)
 # Written in pieces, or this file would break its own rule.
 LEFTOVER = re.compile(r"\b(" + "|".join(["TO" "DO", "FIX" "ME", "X" "XX", "HA" "CK", "place" "holder", "not " "implemented"]) + r")\b")
 # libstdc++ 12 returns or makes std::ranges::subrange in these, whose constraints Clang 14 cannot check.
@@ -155,6 +192,20 @@ class Tree:
                 if match:
                     yield file, number, match.group(2), match.group(1) == '"'
 
+    def imports(self):
+        """(file, line number, the file that it names) of every import of ours in the viewer's sources."""
+        for file in self.files:
+            if not file.startswith(VIEWER) or not file.endswith(".ts"):
+                continue
+            text = (self.root / file).read_text(encoding="utf-8")
+            for match in IMPORT.finditer(text):
+                name = match.group(2)
+                base = posixpath.dirname(file) if name.startswith(".") else posixpath.dirname(VIEWER.rstrip("/"))
+                target = posixpath.normpath(posixpath.join(base, name))
+                if not target.endswith((".ts", ".css")):
+                    target += ".ts"
+                yield file, text.count("\n", 0, match.start(2)) + 1, target
+
 
 def matches(path, patterns):
     return any(re.match(pattern, path) for pattern in patterns)
@@ -202,6 +253,65 @@ def folders_form_no_circle(tree):
             back = way(other, one, {other})
             if back is not None:
                 yield f"{why}, though {other} uses {one}: {'; '.join(back)}"
+
+
+def viewer_folder(file):
+    return posixpath.dirname(file)[len(VIEWER):]
+
+
+def viewer_imports_follow_the_arrows(tree):
+    for file, number, target in tree.imports():
+        folder = viewer_folder(file)
+        allowed = VIEWER_IMPORTS.get(folder)
+        if allowed is None:
+            yield f"{file}:{number}: no rule says what {folder}/ may import; add a row to VIEWER_IMPORTS"
+        elif not target.startswith(VIEWER):
+            yield f"{file}:{number}: imports {target}, which is no part of the viewer"
+        elif viewer_folder(target) not in allowed | {folder}:
+            yield f"{file}:{number}: imports {target}, but may import of ours only {', '.join(sorted(allowed)) or 'its own folder'}"
+
+
+def viewer_imports_make_no_circle(tree):
+    """Neither of files nor of folders. Imports of types alone count: whoever reads one file must read the other, too."""
+    files, folders = {}, {}
+    for file, _, target in tree.imports():
+        files.setdefault(file, set()).add(target)
+        if viewer_folder(file) != viewer_folder(target):
+            folders.setdefault(viewer_folder(file), set()).add(viewer_folder(target))
+    for name, graph in ("files", files), ("folders", folders):
+        for circle in circles(graph):
+            yield f"{VIEWER}: a circle of {name}: {' -> '.join(one or 'main' for one in circle)}"
+
+
+def circles(graph):
+    """One for each place where the way through a graph meets itself again: its nodes, with the first once more at the end."""
+    done, way = set(), []
+
+    def visit(node):
+        if node in way:
+            yield way[way.index(node):] + [node]
+        elif node not in done:
+            way.append(node)
+            for other in sorted(graph.get(node, ())):
+                yield from visit(other)
+            done.add(way.pop())
+
+    for start in sorted(graph):
+        yield from visit(start)
+
+
+def viewer_classes_are_small(tree):
+    for file in tree.files:
+        if not file.startswith(VIEWER) or not file.endswith(".ts"):
+            continue
+        for name, body in CLASS.findall((tree.root / file).read_text(encoding="utf-8")):
+            methods = len(METHOD.findall(body))
+            parameters = "".join(CONSTRUCTOR.findall(body))
+            members = len(MEMBER.findall(body)) + len(PARAMETER_MEMBER.findall(parameters))
+            if methods > MAX_METHODS:
+                yield f"{file}: {name} has {methods} methods, more than {MAX_METHODS}; it does too much"
+            if members > MAX_MEMBERS:
+                yield f"{file}: {name} has {members} members, more than {MAX_MEMBERS}; it does too much"
 
 
 def libraries_stay_at_home(tree):
@@ -274,7 +384,8 @@ def readme_explains_every_package(tree):
 
 
 RULES = [
-    own_includes_follow_the_arrows, folders_form_no_circle, libraries_stay_at_home, top_level_is_fixed, files_are_short,
-    nothing_is_left_over, clones_are_made_in_one_way, clang_14_can_compile_it, no_machine_is_named,
+    own_includes_follow_the_arrows, folders_form_no_circle, viewer_imports_follow_the_arrows,
+    viewer_imports_make_no_circle, viewer_classes_are_small, libraries_stay_at_home, top_level_is_fixed,
+    files_are_short, nothing_is_left_over, clones_are_made_in_one_way, clang_14_can_compile_it, no_machine_is_named,
     readme_explains_every_package,
 ]

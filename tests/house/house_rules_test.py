@@ -14,6 +14,7 @@ class ThisCheckout(unittest.TestCase):
     def test_keeps_every_rule(self):
         tree = Tree(ROOT)
         self.assertGreater(len(list(tree.includes())), 20, "the rules saw no sources")
+        self.assertGreater(len(list(tree.imports())), 20, "the rules saw no sources of the viewer")
         for rule in house_rules.RULES:
             with self.subTest(rule=rule.__name__):
                 broken = list(rule(tree))
@@ -101,6 +102,56 @@ class EachRule(unittest.TestCase):
         self.write("common/b.h", '#include "c.h"\n')
         self.write("common/c.h", "")
         self.assertEqual(len(self.complaints(rule)), 1)
+
+    def importing(self, rule, **sources):
+        """Complaints about the viewer's files, each given as folder__name='import lines'."""
+        for name, text in sources.items():
+            self.write(f"client/web/src/{name.replace('__', '/')}.ts", text)
+        found = self.complaints(rule)
+        for name in sources:
+            (self.root / f"client/web/src/{name.replace('__', '/')}.ts").unlink()
+        return len(found)
+
+    def test_arrows_between_folders_of_the_viewer(self):
+        rule = house_rules.viewer_imports_follow_the_arrows
+        for file, text in [
+            ("protocol__a", "import { b } from '../document/b';"), ("document__a", "import type { B } from '../ui/b';"),
+            ("view__light__a", "export { b } from '../scene/b';"), ("ui__a", "import '../app/app';"),
+            ("editing__a", "import {\n  type B,\n} from '../looking/b';"), ("page__a", "const b = await import('../ui/b');"),
+            ("view__looks__a", 'import { b } from "../../protocol/b";'), ("unruly__a", "import { b } from '../page/b';"),
+            ("tiles__a", "new Worker(new URL('../ui/worker.ts', import.meta.url));"),
+            ("protocol__a", "import { b } from 'src/ui/b';"), ("page__a", "import { b } from '../../../lib/b';"),
+        ]:
+            self.assertEqual(self.importing(rule, **{file: text}), 1, f"{file}: {text} must be refused")
+        for file, text in [
+            ("main", "import { App } from './app/app';"), ("protocol__a", "import { b } from './b';"),
+            ("document__a", "import type { B } from '../protocol/b';"), ("view__viewer", "import { B } from './rays/b';"),
+            ("app__a", "import { B } from '../ui/b';"), ("page__a", "import { Vector3 } from 'three';"),
+        ]:
+            self.assertEqual(self.importing(rule, **{file: text}), 0, f"{file}: {text} must be accepted")
+
+    def test_circles_in_the_viewer(self):
+        rule = house_rules.viewer_imports_make_no_circle
+        self.assertEqual(self.importing(rule, ui__a="import { b } from './b';", ui__b="import { c } from './c';"), 0)
+        self.assertEqual(self.importing(rule, ui__a="import { b } from './b';", ui__b="import type { A } from './a';"), 1)
+        self.assertEqual(self.importing(
+            rule, ui__a="import './b';", ui__b="import './c';", ui__c="export * from './d';", ui__d="import('./b');"), 1)
+        # Folders, of whose files none imports itself again.
+        self.assertEqual(self.importing(rule, ui__a="import '../page/b';", page__c="import '../ui/d';"), 1)
+
+    def test_size_of_classes_in_the_viewer(self):
+        rule = house_rules.viewer_classes_are_small
+
+        def count(methods, members, parameters=0):
+            lines = [f"  private readonly member{i} = 1;" for i in range(members)]
+            lines += ["  constructor(", *(f"    private readonly p{i}: A," for i in range(parameters)), "  ) {}"]
+            lines += [f"  async method{i}<T>(a: A): void {{\n    call(a);\n  }}" for i in range(methods)]
+            return self.importing(rule, ui__a="export class A implements B {\n" + "\n".join(lines) + "\n}\n")
+
+        self.assertEqual(count(house_rules.MAX_METHODS, house_rules.MAX_MEMBERS), 0)
+        self.assertEqual(count(house_rules.MAX_METHODS + 1, 0), 1)
+        self.assertEqual(count(0, house_rules.MAX_MEMBERS + 1), 1)
+        self.assertEqual(count(0, house_rules.MAX_MEMBERS, 1), 1)
 
     def test_homes_of_libraries(self):
         def count(file, header):

@@ -1,7 +1,7 @@
-// Starts the viewer, or says why it cannot.
+// Starts the viewer, or tells the user why it cannot start.
 
-import { App } from './app';
-import { h } from './ui/dom';
+import { App } from './app/app';
+import { h } from './page/dom';
 
 declare global {
   interface Window {

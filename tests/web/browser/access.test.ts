@@ -78,10 +78,10 @@ it.each(['dark', 'light'] as const)('can be read in %s colours', async (scheme) 
   await converged(page);
   await page.waitForFunction((theme) => document.documentElement.dataset['theme'] === theme, scheme);
   await page.evaluate(() => {
-    const { frame, edit, view } = window.viewer!;
+    const { frame, edit, meter, view } = window.viewer!;
     edit.selectNext(1);
     void view.setMode('irradiance');
-    view.meter.toggle();
+    meter.toggle();
     frame.toasts.show('A note', 'good');
     frame.toasts.show('A refusal', 'bad');
     frame.setBanner('link', 'No connection.', 'Try now', () => undefined);

@@ -62,7 +62,7 @@ it('takes a bookmark for what it is of: one of the errors that comes late says n
   });
   await page.goto(server.url);
   await converged(page);
-  const held = () => page.evaluate(() => (window.viewer as unknown as { resume: { tileVersion: number } }).resume);
+  const held = () => page.evaluate(() => window.viewer!.session.told.resume!);
   const before = await held();
   tell({
     jsonrpc: '2.0',

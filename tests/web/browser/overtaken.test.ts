@@ -16,7 +16,7 @@ declare global {
 
 /** What of the viewer is nobody else's business. */
 interface Inside {
-  compile(scene: object): Promise<void>;
+  programs: { compile(scene: object): Promise<void> };
 }
 
 /** Requests for a path wait in `held` until each is let go; later ones go on when `open` is set. */
@@ -77,7 +77,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
   // While it is read, and while the card makes its programs.
   const kept = await page.evaluate(async () => {
     const { viewer } = window.viewer!;
-    const inside = viewer as unknown as Inside;
+    const { programs } = viewer as unknown as Inside;
     const glb = await (await fetch('/scene.glb')).arrayBuffer();
     const { note } = viewer.set!;
     const expect = (step: number) => viewer.layouts.expect({ ...note, layout: note.layout + 1000 + step })!;
@@ -85,12 +85,12 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     const reading = viewer.load(glb.slice(0), first);
     const second = expect(1);
     await reading;
-    const compile = inside.compile.bind(viewer);
+    const compile = programs.compile.bind(programs);
     let begun = () => {};
     let release = () => {};
     const compiling = new Promise<void>((resolve) => (begun = resolve));
     const released = new Promise<void>((resolve) => (release = resolve));
-    inside.compile = async (scene) => {
+    programs.compile = async (scene) => {
       await compile(scene);
       begun();
       await released;
@@ -100,7 +100,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     const third = expect(2);
     release();
     await loading;
-    delete (inside as Partial<Inside>).compile;
+    delete (programs as Partial<Inside['programs']>).compile;
     return { staged: viewer.layouts.stagedScene !== undefined, third: viewer.set === third };
   });
   expect(kept).toEqual({ staged: false, third: true });
@@ -142,19 +142,16 @@ it('takes a bookmark for the layout that it is of: one that is overtaken says no
   await converged(page);
   const { complete, moved } = await page.evaluate(async () => {
     const app = window.viewer!;
-    const inside = app as unknown as {
-      tiles: { sent: number; take(reply: { ticket: number; bytes: number }): void };
-      resume: { tileVersion: number };
-      onBookmark(bookmark: object): void;
-    };
-    const { viewer } = app;
-    const { tileVersion } = inside.resume;
-    const ticket = ++inside.tiles.sent; // a tile that is being decoded
-    inside.onBookmark({ ...app.bookmark!, tileVersion: tileVersion + 1 });
+    const { viewer, bookmarks } = app;
+    const { told } = app.session;
+    const tiles = app.tiles as unknown as { sent: number; take(reply: { ticket: number; bytes: number }): void };
+    const { tileVersion } = told.resume!;
+    const ticket = ++tiles.sent; // a tile that is being decoded
+    bookmarks.take({ ...app.bookmark!, tileVersion: tileVersion + 1 });
     const { note } = viewer.set!;
     const set = viewer.layouts.expect({ ...note, layout: note.layout + 1000 })!;
-    inside.tiles.take({ ticket, bytes: 0 });
-    return { complete: set.complete, moved: inside.resume.tileVersion - tileVersion };
+    tiles.take({ ticket, bytes: 0 });
+    return { complete: set.complete, moved: told.resume!.tileVersion - tileVersion };
   });
   expect(complete).toBe(false);
   expect(moved).toBe(0);
@@ -361,8 +358,7 @@ it('does not take the geometry of another layout than it has asked for', async (
   // One that is not there any more says nothing to the reader: the next is on its way.
   gate.open = true;
   await page.evaluate(async () => {
-    const { viewer } = window.viewer!;
-    const { geometry } = window.viewer! as unknown as { geometry: { load(note: object, set: object): Promise<void> } };
+    const { viewer, geometry } = window.viewer!;
     await geometry.load({ ...viewer.set!.note, uvs: '/scene.glb?layout=0' }, viewer.set!);
   });
   await configure(page, 11_000);

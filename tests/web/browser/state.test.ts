@@ -176,10 +176,10 @@ it('does not call good what has stopped short of its target', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
-  const tell = (state: string) =>
+  const tell = (state: Progress['state']) =>
     page.evaluate((state) => {
-      const app = window.viewer! as unknown as { progress: object; onProgress(progress: object): void };
-      app.onProgress({ ...app.progress, state });
+      const { progress, solve } = window.viewer!;
+      solve.onProgress({ ...progress!, state });
     }, state);
   const dot = () => page.evaluate(() => document.querySelector('.chip .dot')!.className);
   for (const [state, shown] of [
@@ -296,7 +296,7 @@ it('plots the whole of a solve, also where the page came when all was done, and 
   await converged(early);
   const late = await pages.open(server.url);
   await converged(late);
-  const samplesOf = (page: Page) => page.evaluate(() => [...window.viewer!.solve.plot.drawn]);
+  const samplesOf = (page: Page) => page.evaluate(() => [...window.viewer!.solve.panel.plot.drawn]);
   const [first, ...more] = await until(
     () => samplesOf(late),
     (samples) => samples.length > 1,

@@ -319,11 +319,11 @@ it('looks nothing up of what has come once all light is there, and does again fo
   const seen = await pixels(page, 60);
   // What it looks up says the same.
   await page.evaluate(() => {
-    const { shown, wholePrograms } = window.viewer!.viewer as unknown as {
+    const { shown, programs } = window.viewer!.viewer as unknown as {
       shown: { showsWhole: boolean };
-      wholePrograms: { turn(): void };
+      programs: { turn(): void };
     };
-    wholePrograms.turn = () => undefined;
+    programs.turn = () => undefined;
     shown.showsWhole = false;
     window.viewer!.viewer.invalidate();
   });

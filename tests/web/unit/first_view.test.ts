@@ -11,10 +11,10 @@ import {
   PlaneGeometry,
   Vector3,
 } from 'three';
-import { insideView } from '../../../client/web/src/view/first_view';
-import { LampMarker } from '../../../client/web/src/view/lamp_marker';
-import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
-import type { LitScene } from '../../../client/web/src/view/lit_scene';
+import { insideView } from '../../../client/web/src/view/rays/first_view';
+import { LampMarker } from '../../../client/web/src/view/scene/lamp_marker';
+import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
+import type { LitScene } from '../../../client/web/src/view/scene/lit_scene';
 
 const CELLS = 60; // 6 x 60 x 60 x 2 triangles of each box
 

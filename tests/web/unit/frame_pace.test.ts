@@ -1,4 +1,4 @@
-import { FramePace, MOVING_FRAME_MS, SCALES } from '../../../client/web/src/view/frame_pace';
+import { FramePace, MOVING_FRAME_MS, SCALES } from '../../../client/web/src/view/frames/frame_pace';
 
 /** A card for which a frame with all pixels takes so long, one after the other; asked every 16 ms, as browsers do. */
 class Card {

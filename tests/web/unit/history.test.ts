@@ -1,5 +1,5 @@
-import { offerOf } from '../../../client/web/src/app_history';
-import { loadNote, wasReplaced } from '../../../client/web/src/app_scene';
+import { offerOf } from '../../../client/web/src/editing/edit_history';
+import { loadNote, wasReplaced } from '../../../client/web/src/scenes/load_note';
 import type { PastRevision, SceneHistory } from '../../../client/web/src/protocol/messages';
 
 const history = (undoable: number, redoable: number, revisions: PastRevision[]): SceneHistory => ({

@@ -1,4 +1,4 @@
-import { LightGate } from '../../../client/web/src/view/light_gate';
+import { LightGate } from '../../../client/web/src/view/exposure/light_gate';
 
 describe('the first light', () => {
   it('is held back until its exposure is known, and then shown', () => {

@@ -1,8 +1,8 @@
 import { decodeRgb9e5, encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import type { Tile } from '../../../client/web/src/protocol/tile_frame';
-import { LightmapPage } from '../../../client/web/src/view/lightmap_page';
-import { LightmapSet } from '../../../client/web/src/view/lightmap_set';
-import { PageRescale } from '../../../client/web/src/view/page_rescale';
+import { LightmapPage } from '../../../client/web/src/view/light/lightmap_page';
+import { LightmapSet } from '../../../client/web/src/view/light/lightmap_set';
+import { PageRescale } from '../../../client/web/src/view/light/page_rescale';
 
 type Renderer = ConstructorParameters<typeof LightmapPage>[0];
 

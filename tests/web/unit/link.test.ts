@@ -1,4 +1,4 @@
-import { fromLink, toLink, type ShownAs } from '../../../client/web/src/view/link';
+import { fromLink, toLink, type ShownAs } from '../../../client/web/src/view/looks/link';
 
 const read = (hash: string) => fromLink(new URLSearchParams(hash));
 

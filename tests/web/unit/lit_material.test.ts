@@ -1,7 +1,7 @@
 // Of faces that lie on each other the one that emits is drawn before the others, as the server lights them.
 
 import { Color, MeshStandardMaterial } from 'three';
-import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
+import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
 
 function glowing(emits?: boolean): LitMaterial {
   const source = new MeshStandardMaterial({ emissive: new Color(1, 1, 1), emissiveIntensity: 100 });

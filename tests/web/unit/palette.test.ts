@@ -1,5 +1,5 @@
 import { readFileSync } from 'node:fs';
-import { NOTHING, paletteGlsl, STOPS } from '../../../client/web/src/view/palette';
+import { NOTHING, paletteGlsl, STOPS } from '../../../client/web/src/view/looks/palette';
 
 /** CIE 1976 L* of an sRGB colour, D65. */
 function lightness(rgb: readonly number[]): number {

@@ -8,11 +8,12 @@ import {
   Texture,
   Vector3,
 } from 'three';
-import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
-import type { LightmapPage } from '../../../client/web/src/view/lightmap_page';
-import type { LitScene } from '../../../client/web/src/view/lit_scene';
-import { LampMarker } from '../../../client/web/src/view/lamp_marker';
-import { luminance, pick, pickSurface, readingAt, type Reading } from '../../../client/web/src/view/picker';
+import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
+import type { LightmapPage } from '../../../client/web/src/view/light/lightmap_page';
+import type { LitScene } from '../../../client/web/src/view/scene/lit_scene';
+import { LampMarker } from '../../../client/web/src/view/scene/lamp_marker';
+import { pick, pickSurface, readingAt, type Reading } from '../../../client/web/src/view/rays/picker';
+import { luminance } from '../../../client/web/src/page/colours';
 
 type Rgb = [number, number, number];
 

@@ -1,8 +1,8 @@
 import { Color, Group, Mesh, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Texture } from 'three';
-import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
-import type { LightmapPage } from '../../../client/web/src/view/lightmap_page';
-import type { LitScene } from '../../../client/web/src/view/lit_scene';
-import { exposureByRays } from '../../../client/web/src/view/ray_exposure';
+import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
+import type { LightmapPage } from '../../../client/web/src/view/light/lightmap_page';
+import type { LitScene } from '../../../client/web/src/view/scene/lit_scene';
+import { exposureByRays } from '../../../client/web/src/view/exposure/ray_exposure';
 
 type Irradiance = [number, number, number] | undefined;
 

@@ -10,9 +10,9 @@ import {
   TorusKnotGeometry,
   Vector3,
 } from 'three';
-import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
-import type { LitScene } from '../../../client/web/src/view/lit_scene';
-import { RayTree } from '../../../client/web/src/view/ray_tree';
+import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
+import type { LitScene } from '../../../client/web/src/view/scene/lit_scene';
+import { RayTree } from '../../../client/web/src/view/rays/ray_tree';
 
 const lit = (change: (source: MeshStandardMaterial) => void = () => undefined) => {
   const source = new MeshStandardMaterial();

@@ -1,5 +1,5 @@
 // A picture comes back from the card without anyone waiting for it; the card is one of our own.
-import { Readback } from '../../../client/web/src/view/readback';
+import { Readback } from '../../../client/web/src/view/exposure/readback';
 
 /** Signals fences when told to, and counts what it was asked for. */
 class Card {

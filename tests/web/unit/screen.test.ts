@@ -1,6 +1,6 @@
 // How many pixels frames are drawn with; browser and card are our own.
 import type { WebGLRenderer } from 'three';
-import { Screen } from '../../../client/web/src/view/screen';
+import { Screen } from '../../../client/web/src/view/frames/screen';
 
 /** Gives a canvas as many pixels as it may have, and none while the context is lost. */
 class Browser {

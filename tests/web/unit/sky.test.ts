@@ -1,8 +1,8 @@
 import { PerspectiveCamera } from 'three';
 import type { Gltf } from '../../../client/web/src/document/gltf';
-import { ViewUniforms } from '../../../client/web/src/view/lit_material';
-import { luminance } from '../../../client/web/src/view/picker';
-import { SkyBackground, skyOf } from '../../../client/web/src/view/sky';
+import { ViewUniforms } from '../../../client/web/src/view/scene/lit_material';
+import { luminance } from '../../../client/web/src/page/colours';
+import { SkyBackground, skyOf } from '../../../client/web/src/view/scene/sky';
 
 const BLUE: [number, number, number] = [1, 2, 4];
 const GREEN: [number, number, number] = [0, 1, 0];

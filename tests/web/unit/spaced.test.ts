@@ -1,4 +1,4 @@
-import { Spaced } from '../../../client/web/src/ui/spaced';
+import { Spaced } from '../../../client/web/src/page/spaced';
 
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());

@@ -1,10 +1,11 @@
 import { execFileSync } from 'node:child_process';
-import { exposureOf } from '../../../client/web/src/view/exposure';
-import { editCommand } from '../../../client/web/src/app_share';
+import { exposureOf } from '../../../client/web/src/view/exposure/exposure';
+import { editCommand } from '../../../client/web/src/scenes/share';
 import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
-import { pageExponent } from '../../../client/web/src/view/lightmap_page';
-import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
-import { fromHex, measured, parseNumber, percent, readable, toHex, withError } from '../../../client/web/src/ui/dom';
+import { pageExponent } from '../../../client/web/src/view/light/lightmap_page';
+import { baseMipFor } from '../../../client/web/src/view/light/lightmap_set';
+import { fromHex, toHex } from '../../../client/web/src/page/colours';
+import { measured, parseNumber, percent, readable, withError } from '../../../client/web/src/page/numbers';
 import type { Patch } from '../../../client/web/src/protocol/messages';
 
 describe('automatic exposure', () => {

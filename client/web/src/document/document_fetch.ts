@@ -1,29 +1,31 @@
-// The whole document, asked for whenever the copy may not fit: once at a time, however often that is found. While somebody
-// drags there are thirty revisions a second, and the document of a large scene takes longer than one of them. Pure.
+// Fetches the whole document when the page's copy may differ from the server's. Only one request runs at a time: a drag
+// makes thirty revisions a second, and the document of a large scene takes longer than one of them. Pure.
 
 export interface DocumentSource {
-  /** What the server has now, and what makes it the copy. Rejects where it is not to be had, and may when aborted. */
+  /**
+   * The server's document; `take` makes it the page's copy. Rejects when there is none, and may reject when aborted.
+   */
   ask(signal: AbortSignal): Promise<{ revision: number; take: () => void }>;
   failed(error: Error): void;
 }
 
 export class DocumentFetch {
-  /** The copy is not known to fit: what was asked for has not come yet, or did not come. */
+  /** The copy may differ from the server's document, which has not come yet, or failed to come. */
   isOwed = false;
   private running: AbortController | undefined;
-  /** Found while something is on its way: it has to be of this revision, or is asked for again. */
+  /** The running request must bring at least this revision; otherwise another request follows. */
   private due: number | undefined;
 
   constructor(private readonly source: DocumentSource) {}
 
-  /** `revision`: one that is at least as new will do; without it only one that is asked for from now on. */
+  /** `revision`: the oldest that will do; without it, only a document that is asked for from now on will do. */
   want(revision = Infinity): void {
     this.isOwed = true;
     if (this.running) this.due = Math.max(this.due ?? 0, revision);
     else void this.run((this.running = new AbortController()));
   }
 
-  /** The connection is gone: what is on its way may be of a server that is not there any more. */
+  /** The connection is gone: the running request may be to a server that no longer exists. */
   forget(): void {
     this.running?.abort();
     this.running = undefined;

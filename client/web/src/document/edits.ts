@@ -1,8 +1,8 @@
-// Patches that the viewer makes, as pure functions of the document.
+// The patches that the viewer makes. Pure functions of the document.
 
 import type { Json, Patch } from '../protocol/messages';
 import { holderOf, nodeName, type Gltf, type GltfLight, type Vec3, type Vec4 } from './gltf';
-import { valueAt } from './json_patch';
+import { isObject, valueAt } from './json_patch';
 
 export function setColour(material: number, gltf: Gltf, rgb: Vec3): Patch {
   const alpha = gltf.materials?.[material]?.pbrMetallicRoughness?.baseColorFactor?.[3] ?? 1;
@@ -28,22 +28,22 @@ export interface Placement {
 }
 
 export function setPlacement(node: number, placement: Placement): Patch {
-  return Object.entries(placement).map(([member, value]) => ({
-    op: 'replace',
-    path: `/nodes/${node}/${member}`,
-    value: value as Json,
-  }));
+  return replaceMembers(`/nodes/${node}`, placement);
 }
 
 export function setLight(light: number, change: Partial<Pick<GltfLight, 'color' | 'intensity'>>): Patch {
-  return Object.entries(change).map(([member, value]) => ({
+  return replaceMembers(`/extensions/KHR_lights_punctual/lights/${light}`, change);
+}
+
+function replaceMembers(path: string, members: object): Patch {
+  return Object.entries(members).map(([member, value]) => ({
     op: 'replace',
-    path: `/extensions/KHR_lights_punctual/lights/${light}/${member}`,
+    path: `${path}/${member}`,
     value: value as Json,
   }));
 }
 
-/** `add` where a member may be missing: it replaces, too. */
+/** Uses `add`, which also replaces, as the members may be missing. */
 export function setVisible(gltf: Gltf, node: number, visible: boolean): Patch {
   const patch = markUsed(gltf, 'KHR_node_visibility');
   const path = `/nodes/${node}/extensions`;
@@ -61,7 +61,9 @@ function markUsed(gltf: Gltf, extension: string): Patch {
   return [{ op: 'add', path: '/extensionsUsed/-', value: extension }];
 }
 
-/** A point light at `translation` (metres) in the scene that is shown. Lists grow at their ends, so indices are known. */
+/**
+ * A point light at `translation` (metres) in the shown scene. Lists grow only at their ends, so the indices are known.
+ */
 export function addLamp(gltf: Gltf, translation: Vec3, candela: number): { patch: Patch; node: number } {
   const node = gltf.nodes?.length ?? 0;
   const lights = gltf.extensions?.KHR_lights_punctual?.lights ?? [];
@@ -93,7 +95,9 @@ function attach(gltf: Gltf, list: string, node: number): Patch[number] {
   return there ? { op: 'add', path: `${list}/-`, value: node } : { op: 'add', path: list, value: [node] };
 }
 
-/** Takes a node out of the scene; it stays in the document, for lists do not shrink. Nothing when it hangs nowhere. */
+/**
+ * Takes a node out of the scene. The node stays in the document, as lists do not shrink. Undefined: it hangs nowhere.
+ */
 export function detachNode(gltf: Gltf, node: number): Patch | undefined {
   const holder = holderOf(gltf, node);
   if (!holder) return undefined;
@@ -120,8 +124,8 @@ function grows(patch: Patch): boolean {
 }
 
 /**
- * What undoes `patch`, given the patch that would put the viewer's copy back: the server's lists do not shrink, so what
- * was appended to them stays, and is only taken out of the scene.
+ * The patch that undoes `patch` on the server. `inverse` would undo it in the viewer's copy; but the server's lists do
+ * not shrink, so an object that was appended stays in its list and is only taken out of the scene.
  */
 export function undoOnServer(patch: Patch, inverse: Patch): Patch {
   if (!grows(patch)) return inverse;
@@ -135,12 +139,12 @@ export function undoOnServer(patch: Patch, inverse: Patch): Patch {
     );
 }
 
-/** An object that was taken out of the scene by undoing is still in the document: it only has to be hung up again. */
+/** An object that undoing took out of the scene is still in the document, and only has to return to the scene. */
 export function redoOnServer(patch: Patch): Patch {
   return grows(patch) ? patch.filter((operation) => HANGING.test(operation.path)) : patch;
 }
 
-/** What people are told that a patch has done: "added lamp 2", "changed wall: colour". `gltf`: the document after it. */
+/** Tells people what a patch has done: "added lamp 2", "changed wall: colour". `gltf`: the document after the patch. */
 export function describePatch(gltf: Gltf, patch: Patch): string {
   const told = { added: new Set<string>(), removed: new Set<string>(), changed: new Set<string>() };
   const isNew = patch.some(({ path }) => path === '/nodes/-');
@@ -155,7 +159,7 @@ export function describePatch(gltf: Gltf, patch: Patch): string {
       if (part) told.changed.add(part);
     }
   }
-  // Where objects come or go, the lists that name them change, too.
+  // The lists of objects change with the objects that come or go, which are named already.
   if (told.added.size + told.removed.size > 0) told.changed.delete(OBJECTS);
   const phrases = Object.entries(told).flatMap(([verb, parts]) =>
     parts.size > 0 ? [`${verb} ${[...parts].slice(0, 3).join(', ')}${parts.size > 3 ? ' and more' : ''}`] : [],
@@ -180,7 +184,7 @@ function changedPart(gltf: Gltf, path: string): string | undefined {
 }
 
 function nameIn(value: Json | undefined): string | undefined {
-  const name = value && typeof value === 'object' && !Array.isArray(value) ? value['name'] : undefined;
+  const name = isObject(value) ? value['name'] : undefined;
   return typeof name === 'string' && name !== '' ? name : undefined;
 }
 

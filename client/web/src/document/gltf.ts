@@ -1,4 +1,4 @@
-// The parts of glTF 2.0 that the viewer reads and edits, with the server's defaults written out.
+// The parts of glTF 2.0 that the viewer reads and edits. The server writes all defaults out.
 
 import type { Json } from '../protocol/messages';
 
@@ -70,8 +70,8 @@ export interface Gltf {
 }
 
 /**
- * Whether numbers of objects mean the same in both: at least half are called alike. Documents of one scene, between which
- * there were edits, are; those of two scenes are by chance alone.
+ * Whether two documents are of one scene, so that a node's number means the same object in both. At least half of the
+ * nodes then have the same names, whatever was edited in between; in two scenes that would be chance.
  */
 export function isSameScene(a: Gltf, b: Gltf): boolean {
   const [left, right] = [a.nodes ?? [], b.nodes ?? []];
@@ -89,7 +89,7 @@ export function materialName(gltf: Gltf, index: number): string {
   return gltf.materials?.[index]?.name || `material ${index}`;
 }
 
-/** Light that a node carries, if any. */
+/** The light of a node, if it has one. */
 export function lightOf(gltf: Gltf, node: number): { index: number; light: GltfLight } | undefined {
   const index = gltf.nodes?.[node]?.extensions?.KHR_lights_punctual?.light;
   const light = index === undefined ? undefined : gltf.extensions?.KHR_lights_punctual?.lights[index];
@@ -105,14 +105,14 @@ const LIGHT_HANDLES: Record<GltfLight['type'], readonly Handle[]> = {
   directional: ['rotate'],
 };
 
-/** By what a node can be placed so that anything changes: a lamp alone has no size, and shines the same all around. */
+/** The handles that change something about a node: a point light, for example, has no size and no direction. */
 export function handlesOf(gltf: Gltf, node: number): readonly Handle[] {
   const { mesh, children } = gltf.nodes?.[node] ?? {};
   const type = lightOf(gltf, node)?.light.type;
   return !type || mesh !== undefined || children?.length ? ALL_HANDLES : (LIGHT_HANDLES[type] ?? ALL_HANDLES);
 }
 
-/** Where a node hangs: pointer of the list that names it, and its place there. */
+/** Where a node hangs: the pointer of the list that names the node, and the place in that list. */
 export function holderOf(gltf: Gltf, node: number): { list: string; place: number } | undefined {
   for (const [s, scene] of (gltf.scenes ?? []).entries()) {
     const place = scene.nodes?.indexOf(node) ?? -1;
@@ -125,7 +125,7 @@ export function holderOf(gltf: Gltf, node: number): { list: string; place: numbe
   return undefined;
 }
 
-/** Nodes of the scene shown, depth first, each with how deep it lies. Cycles end, and no chain is too long. */
+/** Nodes of the shown scene and their depths, depth first. Copes with cycles, and with chains of any length. */
 export function hangingNodes(gltf: Gltf): { node: number; depth: number }[] {
   const out: { node: number; depth: number }[] = [];
   const seen = new Set<number>();

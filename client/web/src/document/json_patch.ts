@@ -1,5 +1,5 @@
-// RFC 6902 on the viewer's copy of the scene, with the server's names (/nodes/@lamp), and what undoes each patch.
-// Pure but for the document that it is given.
+// JSON Patch (RFC 6902) with the server's names of elements (/nodes/@lamp), and the inverse of each patch. The
+// functions change nothing but the given document.
 
 import type { Json, Patch, PatchOperation } from '../protocol/messages';
 
@@ -49,7 +49,7 @@ export function valueAt(document: Json, pointer: string): Json | undefined {
   return at;
 }
 
-function isObject(value: Json | undefined): value is { [member: string]: Json } {
+export function isObject(value: unknown): value is { [member: string]: Json } {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
@@ -74,7 +74,7 @@ function indexIn(array: Json[], key: string, pointer: string, end: number): numb
   return index;
 }
 
-/** Sets a member as its own, also one called __proto__. */
+/** Defines an own member, even one that is called __proto__. */
 function setMember(object: { [member: string]: Json }, key: string, value: Json): void {
   Object.defineProperty(object, key, { value, enumerable: true, writable: true, configurable: true });
 }
@@ -131,7 +131,7 @@ function sourceOf(operation: PatchOperation): string {
   return operation.from;
 }
 
-/** One operation on the document itself; returns the operations that undo it, in order. */
+/** Changes the document by one operation. Returns the operations that undo it, in order. */
 function applyOperation(document: Json, operation: PatchOperation): Patch {
   const path = withoutNames(document, operation.path);
   switch (operation.op) {
@@ -161,7 +161,7 @@ function applyOperation(document: Json, operation: PatchOperation): Patch {
   }
 }
 
-/** Applies all or nothing; returns the patch that undoes it. Throws PatchError. */
+/** Applies the whole patch or nothing of it. Returns the patch that undoes it. Throws PatchError. */
 export function applyPatch(document: Json, patch: Patch): Patch {
   const steps: Patch[] = [];
   const inverse = () => steps.reverse().flat();

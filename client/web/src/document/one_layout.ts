@@ -1,24 +1,23 @@
-// Files of one layout: a scene's lightmap coordinates fit the pages that were laid out with them, and no others. An edit
-// between two requests may lay all of them out anew.
+// Fetches files that belong to one layout: lightmap coordinates fit only the pages that were laid out with them, and an
+// edit between two requests may make a new layout.
 
-import type { LightmapsNote } from '../protocol/messages';
+import { NO_CONTENT, type LightmapsNote } from '../protocol/messages';
 
-const NO_CONTENT = 204;
-/** Of all that belongs together; whoever edits faster than this has to come to rest first. */
+/** Attempts to fetch all files of one layout. If edits come faster, the user has to wait for them to end. */
 const TRIES = 4;
-/** A layout that has just come may be told of a moment after the answer that its forerunner is gone. */
+/** The message about a new layout may come a moment after the answer that the old one is gone. */
 const PAUSES = 30;
 
 export interface Layouts {
-  /** The newest that the page was told of; undefined: there is none. */
+  /** The newest layout that the page knows of; undefined: there is none. */
   now(): LightmapsNote | undefined;
-  /** Rejects with what the server says is wrong. */
+  /** Rejects with the reason that the server gives. */
   fetch(path: string, init?: RequestInit): Promise<Response>;
-  /** A moment in which the server's messages come in. */
+  /** A moment for the server's messages to arrive. */
   pause(): Promise<void>;
 }
 
-/** The lit scene, with coordinates for the pages that the page was told of. */
+/** The lit scene, with coordinates for the newest lightmap pages. */
 export function fetchLitScene(layouts: Layouts): Promise<Blob> {
   return ofOneLayout(layouts, async ({ uvs }) => {
     const response = await layouts.fetch(uvs);
@@ -26,10 +25,10 @@ export function fetchLitScene(layouts: Layouts): Promise<Blob> {
   });
 }
 
-/** All pages of light, every one of the same layout. */
+/** All lightmap pages of the newest layout. */
 export function fetchLightmaps(layouts: Layouts): Promise<Blob[]> {
   return ofOneLayout(layouts, async ({ pages, uvs }) => {
-    // Layouts only ever rise, so one that is there after the last page was there all the while.
+    // No layout returns, so one that is there after the last page was there all the time.
     const isThere = async () => (await layouts.fetch(uvs, { method: 'HEAD' })).status !== NO_CONTENT;
     const blobs: Blob[] = [];
     try {
@@ -43,7 +42,7 @@ export function fetchLightmaps(layouts: Layouts): Promise<Blob[]> {
   });
 }
 
-/** `take` returns undefined where the layout was gone before all of it was there. */
+/** `take` returns undefined when the layout was gone before all of its files were fetched. */
 async function ofOneLayout<T>(layouts: Layouts, take: (note: LightmapsNote) => Promise<T | undefined>): Promise<T> {
   for (let tried = 0; tried < TRIES; ++tried) {
     const note = layouts.now();

@@ -1,6 +1,6 @@
-// The viewer's copy of the scene, and the edits on their way to the server. What the user does shows at once; what the
-// server refuses is taken back with its reason. One edit is on the way at a time: while somebody drags, later positions
-// replace the one that waits. Main thread; knows no pictures.
+// The viewer's copy of the scene, and the edits that wait for the server. An edit shows at once; if the server refuses
+// it, it is taken back and the reason is shown. One edit is sent at a time: during a drag, later positions replace the
+// one that waits. Main thread; knows nothing of pictures.
 
 import { STALE_REVISION, type Json, type Patch, type ScenePatchReply } from '../protocol/messages';
 import { ConnectionLost, RpcError } from '../protocol/rpc';
@@ -14,40 +14,40 @@ export interface EditEntry {
   inverse: Patch;
 }
 
-/** What an edit is to the history: a step of it, one of them taken back or made again, or the end of one that shall not be. */
+/** What an edit is to the history: a new step, an undone or a redone step, or the cancellation of one. */
 type Role = 'step' | 'undo' | 'redo' | 'cancel';
 
 interface PendingEdit extends EditEntry {
-  /** Edits with the same key replace each other while they wait, and are one step of undo. */
+  /** Edits with the same key replace each other while they wait, and make one step of undo. */
   key: string | undefined;
   requestId: string;
-  /** Of the copy when it was made. */
+  /** Revision of the copy when the edit was made. */
   revision: number;
-  /** Puts the copy back; empty while the edit is not shown. */
+  /** Takes the edit out of the copy again; empty while the copy does not show the edit. */
   shown: Patch;
   role: Role;
   confirmed: boolean;
-  /** Its scene is gone, which was told. */
+  /** The edit's scene is gone, and the user was told so. */
   left: boolean;
   done: (error?: Error) => void;
 }
 
 export interface DocumentEvents {
-  /** Members below these pointers have other values now; empty: everything. */
+  /** Members below these pointers have changed; no pointers: everything has. */
   changed(pointers: string[]): void;
   refused(label: string, reason: string): void;
   historyChanged(): void;
 }
 
-/** An edit as the server hears of it, in the same words each time that it is sent. */
+/** An edit as it is sent to the server; the same each time that it is sent. */
 export interface SentEdit {
   patch: Patch;
   requestId: string;
-  /** The revision that it was made at: the server refuses it where another scene was loaded since. */
+  /** Revision that the edit was made at: the server refuses the edit if another scene was loaded since. */
   sameSceneAs: number;
 }
 
-/** `isMeant`: false once the scene that the edit was made for is known to be gone: it must not be sent (again). */
+/** `isMeant`: false once the edit's scene is known to be gone; then the edit must not be sent, or sent again. */
 export type SendEdit = (edit: SentEdit, isMeant: () => boolean) => Promise<ScenePatchReply>;
 
 const MAX_HISTORY = 200;
@@ -57,21 +57,21 @@ export class SceneDocument {
   revision = 0;
   readonly undoStack: EditEntry[] = [];
   readonly redoStack: EditEntry[] = [];
-  /** Revisions that took back what this page had done; to the server they are edits like others. */
+  /** Revisions by which this page took back its own edits; to the server they are edits like others. */
   readonly takenBack = new Set<number>();
   private readonly waiting: (() => void)[] = [];
   lastEdit: Patch | undefined;
   private pending: PendingEdit[] = [];
   private gesture = 0;
-  /** On its way to the server; no more of the list where that was taken away. */
+  /** The edit on its way to the server. It is no longer in `pending` after a reset. */
   private sending: PendingEdit | undefined;
   private openKey: string | undefined;
 
   private generation = 0;
-  /** Another scene is on the server: numbers of the copy's objects mean others there. */
+  /** The server has another scene, in which the numbers of the copy's objects mean other objects. */
   private isGone = false;
 
-  /** `isMine`: whether the server tells of our patches under that name; nobody else's does. */
+  /** `isMine`: whether a patch by that name is this page's own. */
   constructor(
     private readonly isMine: (by: string) => boolean,
     private readonly send: SendEdit,
@@ -79,8 +79,8 @@ export class SceneDocument {
   ) {}
 
   /**
-   * The document as the server has it. What waits to be sent is laid upon it; of what is on its way it is not known
-   * whether the document has it already, which the notification will tell.
+   * Takes the server's document as the copy, and shows the waiting edits in it. The document may or may not contain the
+   * edit that is on its way: the notification will tell.
    */
   reset(gltf: Gltf, revision: number): void {
     this.gltf = gltf;
@@ -100,8 +100,8 @@ export class SceneDocument {
   }
 
   /**
-   * Another scene is on the server, and its document follows: what has not been made was meant for objects of this one,
-   * and would change whatever has their numbers there. Until then nothing is edited.
+   * The server has another scene, and its document follows. Edits that wait were meant for this scene and would change
+   * the wrong objects, so they are dropped. Until the document is here nothing can be edited.
    */
   leave(reason: string): void {
     this.isGone = true;
@@ -117,7 +117,7 @@ export class SceneDocument {
     if (last) this.events.refused(last.label, reason);
   }
 
-  /** A patch that the server has made, ours or someone else's. False: the copy does not fit; fetch the scene anew. */
+  /** The server has applied a patch, ours or someone else's. False: the copy is wrong and must be fetched again. */
   patched(revision: number, patch: Patch, by: string): boolean {
     if (revision <= this.revision) return true;
     if (revision !== this.revision + 1) return false; // one was lost on the way
@@ -126,7 +126,7 @@ export class SceneDocument {
       this.confirm(first, revision);
       return true;
     }
-    // A server that was started again tells what it had made of ours in its own words.
+    // A server that has restarted repeats our patch in its own words.
     if (this.isMine(by) && first) return false;
     this.takeBackPending();
     try {
@@ -143,25 +143,27 @@ export class SceneDocument {
 
   /**
    * Shows the edit and sends it. `key` marks the edits of one gesture. The promise ends with the server's answer, or
-   * when a later edit of the gesture took this one's place.
+   * when a later edit of the gesture takes the place of this one.
    */
   edit(label: string, patch: Patch, key?: string): Promise<void> {
     return this.enqueue(label, patch, 'step', key);
   }
 
-  /** Until every edit that was made here so far is answered. */
+  /** Ends when the server has answered all edits that were made here. */
   async settled(): Promise<void> {
     while (this.pending.length > 0) await new Promise<void>((done) => this.waiting.push(done));
   }
 
-  /** The gesture is over: the next edit with its key is a new step. Those on their way still belong to this one. */
+  /**
+   * The gesture is over, and the next edit with its key is a new step. Edits on their way still belong to the gesture.
+   */
   endGesture(): void {
     ++this.gesture;
   }
 
   /**
-   * The gesture `kind` that is under way shall not have been: `patch` puts back what was there before it. Where the server
-   * has heard of none of it, nor does it hear of this; no step of undo stays.
+   * Cancels the gesture `kind`, without leaving a step of undo. `patch` restores the state before the gesture; it is
+   * sent only if the server knows of the gesture.
    */
   async cancelGesture(label: string, kind: string, patch: Patch): Promise<void> {
     const key = `${kind} #${this.gesture}`;
@@ -191,8 +193,8 @@ export class SceneDocument {
       await this.enqueue(label, patch, role, undefined);
       if (generation === this.generation) to.push(entry);
     } catch (error) {
-      // The reason was shown. What the server refuses it will refuse again, as where somebody else has undone it already:
-      // that must not stand before the steps below.
+      // The reason was shown. The server would refuse the step again (somebody else may have undone it), so the step is
+      // dropped: otherwise the user could not reach the steps below it.
       if (generation === this.generation && !(error instanceof RpcError)) from.push(entry);
     }
     this.events.historyChanged();
@@ -202,7 +204,7 @@ export class SceneDocument {
     return this.gltf as unknown as Json;
   }
 
-  /** The newest of a gesture's edits, where it is not on its way yet. */
+  /** Drops the newest edit of a gesture, unless it is on its way already. */
   private dropWaiting(key: string): boolean {
     const waiting = this.pending.at(-1);
     if (!waiting || waiting === this.sending || waiting.key !== key) return false;
@@ -222,7 +224,7 @@ export class SceneDocument {
     return new Promise((resolve, reject) => {
       if (this.isGone) {
         const error = new Error('the server has another scene, which is still on its way');
-        this.events.changed(forward.map((operation) => operation.path)); // what was dragged goes back
+        this.events.changed(forward.map((operation) => operation.path)); // a dragged object returns
         this.events.refused(label, error.message);
         return reject(error);
       }
@@ -247,7 +249,7 @@ export class SceneDocument {
     });
   }
 
-  /** An edit that does not fit the copy may fit the server's scene: it is sent all the same. */
+  /** An edit that does not fit the copy is sent all the same, as it may fit the server's scene. */
   private show(edit: PendingEdit): void {
     if (edit.confirmed) return;
     try {
@@ -280,11 +282,11 @@ export class SceneDocument {
         this.confirm(edit, reply.revision);
         edit.done();
       } catch (error) {
-        // It was made for another scene than the server has, of which news is on its way; so was all that waits.
+        // The edit, and all that wait, were made for another scene than the server has; a message about it follows.
         if (error instanceof RpcError && error.code === STALE_REVISION) this.leave('another scene was loaded');
         else this.refuse(edit, error as Error);
       }
-      // A scene that came meanwhile has taken the list away, or the notification has taken the edit off it.
+      // A new scene may have replaced the list meanwhile, or the edit may have been refused.
       if (this.pending[0] === edit) this.pending.shift();
     }
     this.sending = undefined;
@@ -292,9 +294,9 @@ export class SceneDocument {
   }
 
   /**
-   * The server has made this edit. It is the oldest of those on their way, so it lies right on top of what the server
-   * had before: what was shown stays, and what puts it back is what undoes it. The notification comes first, as a rule;
-   * the edit stays in the list, as nothing but a reminder, until the answer is there.
+   * The server has made this edit. As the oldest pending edit it lies directly on the server's last state, so the patch
+   * that takes it out of the copy also undoes it on the server. As a rule the notification comes before the answer;
+   * until then the edit stays in the list.
    */
   private confirm(edit: PendingEdit, revision: number): void {
     if (edit.confirmed || this.pending[0] !== edit) return;
@@ -328,7 +330,7 @@ export class SceneDocument {
 
   private refuse(edit: PendingEdit, error: Error): void {
     if (edit.left) return;
-    if (edit.confirmed) return edit.done(); // the answer was lost on its way, the notification was not
+    if (edit.confirmed) return edit.done(); // only the answer was lost; the notification has come
     if (this.pending[0] === edit) {
       this.takeBackPending();
       this.pending.shift();
@@ -340,7 +342,7 @@ export class SceneDocument {
   }
 }
 
-/** Pages without TLS have no crypto.randomUUID; nobody gains by guessing these. */
+/** Pages without TLS have no crypto.randomUUID. Nobody gains by guessing these. */
 function newRequestId(): string {
   return `edit-${Date.now().toString(36)}-${Math.random().toString(36).slice(2)}`;
 }

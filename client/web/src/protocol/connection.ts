@@ -1,5 +1,5 @@
-// The connection to the server: opens, says hello, subscribes, and when it is lost comes back with growing pauses and
-// takes up where it was. Owned by the App; main thread.
+// The connection to the server. It opens, says hello and subscribes; a lost connection opens again after growing pauses
+// and resumes where it was. One for a page; main thread.
 
 import { CreditWindow, FIRST_WINDOW } from './credit';
 import {
@@ -17,7 +17,7 @@ import { Rpc, RpcError } from './rpc';
 
 const FIRST_PAUSE_MS = 250;
 const MAX_PAUSE_MS = 10_000;
-/** The server pings a silent peer, which a page cannot see: so the page asks now and then, and gives up after this. */
+/** A page cannot see the server's pings, so it asks the server now and then, and gives up when no answer comes. */
 const PROBE_MS = 15_000;
 const PROBE_PATIENCE_MS = 8_000;
 
@@ -25,7 +25,7 @@ export type LinkState = 'connecting' | 'open' | 'waiting' | 'refused';
 
 export interface ConnectionEvents {
   state(state: LinkState, detail: string): void;
-  /** Handshake done; calls may be made. */
+  /** The handshake is done, and calls may be made. */
   ready(info: ServerInfo, hello: HelloReply): void;
   notification<K extends keyof Notifications>(method: K, params: Notifications[K]): void;
   tile(frame: ArrayBuffer): void;
@@ -35,20 +35,30 @@ export interface ConnectionOptions {
   url: string;
   client: string;
   token: () => string | undefined;
-  /** What the page holds, from its last bookmark. */
+  /** The light that the page holds, by its last bookmark. */
   resume: () => Resume | undefined;
   subscription: () => SubscribeParams;
   makeSocket?: (url: string, protocol: string) => WebSocket;
   random?: () => number;
 }
 
-/** Grows by 1.7 with a quarter of chance either way, so that a room full of pages does not come back at once. */
+/** Grows by 1.7 each time, with a random part of a quarter, so that a roomful of pages does not return at once. */
 export function pauseMs(attempt: number, random: number): number {
   const base = Math.min(MAX_PAUSE_MS, FIRST_PAUSE_MS * 1.7 ** attempt);
   return Math.round(base * (0.75 + 0.5 * random));
 }
 
-export class Connection {
+/** What the parts of the viewer ask of the connection. */
+export interface Server {
+  /** Undefined while there is no connection. */
+  readonly info: ServerInfo | undefined;
+  readonly isOpen: boolean;
+  has(capability: string): boolean;
+  /** Rejects with RpcError (the server's refusal) or ConnectionLost. */
+  call<T>(method: string, params?: object): Promise<T>;
+}
+
+export class Connection implements Server {
   info: ServerInfo | undefined;
   credit = new CreditWindow();
   private socket: WebSocket | undefined;
@@ -57,15 +67,15 @@ export class Connection {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private probe: ReturnType<typeof setInterval> | undefined;
   private stopped = false;
-  private isBehind = false; // what was missed was too much for one go: start afresh
-  private isRefused = false; // the token, by the answer to this socket's hello
+  private isBehind = false; // the page missed too much to resume: it starts afresh
+  private isRefused = false; // the server has refused the token of this socket's hello
 
   constructor(
     private readonly options: ConnectionOptions,
     private readonly events: ConnectionEvents,
   ) {}
 
-  /** Opens now, whatever pause is running. */
+  /** Opens now, without waiting for the end of a pause. */
   open(): void {
     clearTimeout(this.timer);
     if (this.socket || this.stopped) return;
@@ -84,7 +94,7 @@ export class Connection {
     socket.onclose = ({ code, reason }) => this.onClose(socket, code, reason);
   }
 
-  /** Says hello anew, as the options are now, and goes on where it was. Without a connection the next one will. */
+  /** Says hello again with the present options, and resumes. Without a connection, the next one does so anyway. */
   renew(): void {
     const { socket } = this;
     if (!socket || !this.isOpen) return;
@@ -94,7 +104,7 @@ export class Connection {
     this.open();
   }
 
-  /** For good: nothing more is told. */
+  /** Closes for good; no more events follow. */
   close(): void {
     this.stopped = true;
     clearTimeout(this.timer);
@@ -113,17 +123,16 @@ export class Connection {
     return this.info?.capabilities.includes(capability) ?? false;
   }
 
-  /** Rejects with RpcError (the server's refusal) or ConnectionLost. */
   call<T>(method: string, params: object = {}): Promise<T> {
     return this.rpc && this.info ? this.rpc.call<T>(method, params) : Promise.reject(new Error('not connected'));
   }
 
-  /** Subscribes anew with what the options say now. */
+  /** Subscribes again with the present options. */
   async subscribe(): Promise<void> {
     await this.call('subscribe', this.options.subscription());
   }
 
-  /** Tells that a frame was used, so that the server may send more. */
+  /** Tells the server that a frame was used, so that it may send more. */
   used(bytes: number): void {
     const credit = this.credit.used(bytes);
     if (credit > 0 && this.isOpen) this.rpc?.notify('credit', { bytes: credit });
@@ -159,13 +168,13 @@ export class Connection {
       await this.subscribe();
       this.watch(rpc);
     } catch (error) {
-      // What was refused is said by the close that follows; anything else is a connection to give up.
+      // After a refusal the server closes the connection; after any other error the page does.
       if (error instanceof RpcError) this.isRefused = error.code === UNAUTHENTICATED;
       else this.socket?.close();
     }
   }
 
-  /** A sleeping machine or a dead route leaves a socket that looks open: ask, and drop it when no answer comes. */
+  /** A sleeping machine or a dead route leaves a socket that looks open; only a call without an answer shows it. */
   private watch(rpc: Rpc): void {
     clearInterval(this.probe);
     this.probe = setInterval(() => void this.check(rpc), PROBE_MS);
@@ -195,7 +204,7 @@ export class Connection {
     if (socket !== this.socket) return;
     this.forget();
     if (this.stopped) return;
-    // Closed with the same code without an answer, hello only came too late: the machine was busy.
+    // The same code without a refusal means that hello came too late, on a busy machine.
     if (code === CLOSE_UNAUTHENTICATED && this.isRefused)
       return this.events.state('refused', reason || 'the token is missing or wrong');
     this.isBehind ||= code === CLOSE_OVERLOAD;

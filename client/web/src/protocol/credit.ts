@@ -1,44 +1,44 @@
-// How much the server may send ahead of what was shown: about half a second of what the network carries, so that a slow
-// line keeps its answers quick, and a quick one is never idle. Pure but for the clock that it is given.
+// How much the server may send ahead of what the page has shown: about half a second's worth, so that a slow network
+// still answers quickly, and a fast one is never idle. Pure: the caller passes the time.
 
 const MIN_WINDOW = 64 * 1024;
 const MAX_WINDOW = 8 * 1024 * 1024;
 const AHEAD_S = 0.5;
 const MEASURE_MS = 400;
-/** A tile of 64 x 64 texels in the format that is asked for first, with its header. */
+/** Bytes of a tile of 64 x 64 texels in the preferred format, with its header. */
 const FRAME = 64 * 64 * 4 + 64;
-/** What comes no later than this after what came before it was there already. */
+/** Frames closer together than this had arrived before and waited in a buffer. */
 const AT_ONCE_MS = 1;
 
 export const FIRST_WINDOW = 512 * 1024;
 
 export class CreditWindow {
   private window = FIRST_WINDOW;
-  private outstanding = FIRST_WINDOW; // what the server may still send, and what was sent and not yet used
-  private ahead = FIRST_WINDOW; // what the server may still send
-  private starved = false; // it may have waited for credit
+  private outstanding = FIRST_WINDOW; // bytes that the server may still send, and bytes that wait to be used
+  private ahead = FIRST_WINDOW; // bytes that the server may still send
+  private starved = false; // the server may have waited for credit
   private measuredSince = -1;
   private measuredBytes = 0;
   private lastMs = 0;
-  /** Before some frame, since measuring began: the page may have been busy with something else. */
+  /** Between two frames, since measuring began: the page may have been busy with something else. */
   private longestPause = { ms: 0, bytes: 0, isOver: true };
 
-  /** Bytes a second while tiles came without a pause; 0 until measured. */
+  /** Bytes a second while tiles arrive without a pause; 0: not measured yet. */
   rate = 0;
 
-  /** A frame has come. */
+  /** A frame has arrived. */
   received(bytes: number, nowMs: number): void {
     this.ahead -= bytes;
     this.starved ||= this.ahead < FRAME;
-    if (this.measuredSince < 0) return this.measureFrom(nowMs); // how long the first was on its way is not known
+    if (this.measuredSince < 0) return this.measureFrom(nowMs); // nobody knows how long the first frame was on its way
     this.measuredBytes += bytes;
     const pause = nowMs - this.lastMs;
     if (pause > this.longestPause.ms) this.longestPause = { ms: pause, bytes, isOver: false };
     else if (pause > AT_ONCE_MS) this.longestPause.isOver = true;
     else if (!this.longestPause.isOver) this.longestPause.bytes += bytes;
     this.lastMs = nowMs;
-    // The longest pause is left out, and what came at once after it, which may have lain in buffers while the page was
-    // busy with something else: of what comes evenly that changes nothing.
+    // The longest pause does not count, nor do the frames right after it: the page may have been busy, and the frames
+    // may have waited in buffers. When frames arrive evenly, this changes nothing.
     const took = nowMs - this.measuredSince - this.longestPause.ms;
     if (took < MEASURE_MS) return;
     const rate = (1000 * (this.measuredBytes - this.longestPause.bytes)) / took;
@@ -47,7 +47,7 @@ export class CreditWindow {
     this.measureFrom(nowMs);
   }
 
-  /** Everything asked for has come: the pause that follows says nothing about the network. */
+  /** All light has arrived: the pause that follows says nothing about the network. */
   idle(): void {
     this.measuredSince = -1;
   }
@@ -59,7 +59,7 @@ export class CreditWindow {
     this.starved = this.ahead < FRAME;
   }
 
-  /** A frame was shown. Returns the credit to give back now; 0: later. */
+  /** A frame was used. Returns the credit to give back now; 0: none yet. */
   used(bytes: number): number {
     this.outstanding -= bytes;
     const missing = this.window - this.outstanding;
@@ -74,7 +74,7 @@ export class CreditWindow {
     this.window = windowFor(this.rate);
   }
 
-  /** The server waited for the page: what came says only what the network carries at least. */
+  /** The server waited for the page, so `rate` is only a lower bound of what the network carries. */
   private adaptToAtLeast(rate: number): void {
     if (this.rate > 0) this.rate = Math.max(this.rate, rate);
     this.window = Math.max(this.window, windowFor(rate));

@@ -1,4 +1,4 @@
-// The messages of protocol/README.md that the viewer speaks, as types. Names and units are the specification's.
+// The messages of protocol/README.md that the viewer uses, as types. Names and units are the specification's.
 
 export type Json = null | boolean | number | string | Json[] | { [member: string]: Json };
 
@@ -59,7 +59,7 @@ export interface Progress {
   fraction?: number;
 }
 
-/** Errors as those of `progress`, at so many seconds of solve time. */
+/** The errors of `progress` at one moment of the solve. */
 export interface ErrorSample {
   seconds: number;
   total: number;
@@ -68,7 +68,7 @@ export interface ErrorSample {
   variation: number;
 }
 
-/** How the error of the present solve has fallen, oldest first. */
+/** How the error of the present solve has fallen; oldest first. */
 export interface SolveHistory {
   revision: number;
   samples: ErrorSample[];
@@ -80,6 +80,9 @@ export interface Sky {
   lower: [number, number, number];
 }
 
+/** How a scene is solved: lamps shoot and texels gather; progressive shooting; Lum, Ma and Max 2002. */
+export type Method = 'gather' | 'shooting' | 'paper';
+
 export interface Settings {
   targetError: number;
   timeLimitMs: number | null;
@@ -87,7 +90,8 @@ export interface Settings {
   texelSize: number;
   seed: number;
   doubleSided: boolean;
-  /** For scenes that have none of their own. */
+  method: Method;
+  /** For scenes without a sky of their own. */
   sky?: Sky | null;
 }
 
@@ -132,7 +136,7 @@ export interface SharedCamera {
   target: [number, number, number];
 }
 
-/** What one texel of the lightmaps has, and the moment that it is of; linear R, G, B, lux. */
+/** The light of one texel at one version, and its standard error; linear R, G, B, lux. */
 export interface TexelReply {
   revision: number;
   tileVersion: number;
@@ -153,7 +157,7 @@ export interface ScenePatchReply {
   affected: { surfaces: number; shots: number };
 }
 
-/** Notifications by method; what is not here is ignored, as the specification asks. */
+/** Notifications by method. The viewer ignores all others, as the specification demands. */
 export interface Notifications {
   serverInfo: ServerInfo;
   progress: Progress;
@@ -172,10 +176,10 @@ export interface Notifications {
 export interface PastRevision {
   revision: number;
   kind: 'load' | 'patch' | 'undo' | 'redo';
-  /** Of a load: the scene's name. */
+  /** The scene's name, if the revision is a load. */
   summary?: string;
   by?: string;
-  /** Of a patch: it is taken back at present. */
+  /** The patch is taken back at present. */
   undone?: boolean;
 }
 
@@ -187,13 +191,16 @@ export interface SceneHistory {
   revisions: PastRevision[];
 }
 
+/** HTTP status: the layout of the file is no longer the newest. */
+export const NO_CONTENT = 204;
+
 export const SUBPROTOCOL = 'radiosity.v1';
 
-/** The close code that trying again does not mend. */
+/** A close code after which it is useless to try again. */
 export const CLOSE_UNAUTHENTICATED = 1008;
 export const CLOSE_OVERLOAD = 1013;
 /** JSON-RPC error of a missing or wrong token. */
 export const UNAUTHENTICATED = -32001;
-/** There is nothing of that name, or no scene. */
+/** JSON-RPC error: there is no object of that name, or no scene. */
 export const NOT_FOUND = -32004;
 export const STALE_REVISION = -32009;

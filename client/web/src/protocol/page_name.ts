@@ -1,23 +1,23 @@
-// The name under which the server tells others of this page: what its user is called, and a mark. Two pages of one user
-// have different ones, so that each knows its own edits when it is told of them. Pure.
+// The name by which the server tells others of this page: the user's name and a mark. Two pages of one user have
+// different marks, so that each page recognises its own edits. Pure.
 
-/** Characters of what a user is called; with the mark it stays within what the protocol allows. */
+/** Characters of a user's name. With the mark the name keeps within the protocol's limit. */
 export const LONGEST_NAME = 48;
 
 const MARKED = /^(.+) \([a-z0-9]{4}\)$/s;
 
-/** Characters of names that are shown, of which programs may have longer ones. */
+/** Characters of a name that is shown; other programs may have longer names. */
 const LONGEST_SHOWN = 60;
 
-/** Control characters, and those that turn the direction of all the text that follows them. */
+/** Control characters, and characters that change the direction of the text after them. */
 const TURNING = /[\u0000-\u001f\u007f-\u009f\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
 
-/** Of a text that others have written: nothing of it changes how the text around it reads. */
+/** A text by somebody else, without characters that would change how the text around it reads. */
 export function plainText(text: string): string {
   return text.replace(TURNING, ' ').trim();
 }
 
-/** "Ann" of "Ann (x3fa)"; names of other programs as they are. Empty where there is nothing to be read. */
+/** "Ann" for "Ann (x3fa)"; the names of other programs as they are. Empty: nothing of the name can be read. */
 export function shownName(client: string): string {
   const plain = plainText(MARKED.exec(client)?.[1] ?? client);
   const letters = [...plain];
@@ -32,7 +32,7 @@ export class PageName {
     this.person = called;
   }
 
-  /** What the user is called; empty: not said. */
+  /** The user's name; empty: the user has given none. */
   get person(): string {
     return this.called;
   }
@@ -41,7 +41,7 @@ export class PageName {
     this.called = [...plainText(called)].slice(0, LONGEST_NAME).join('').trim();
   }
 
-  /** How the page is called where its user is not. */
+  /** The page's name while its user has none. */
   get unnamed(): string {
     return `viewer ${this.mark}`;
   }
@@ -50,7 +50,7 @@ export class PageName {
     return this.called ? `${this.called} (${this.mark})` : this.unnamed;
   }
 
-  /** Also by an earlier name of this page. */
+  /** Also true of an earlier name of this page. */
   isMine(client: string): boolean {
     return client === this.unnamed || client.endsWith(` (${this.mark})`);
   }

@@ -7,7 +7,7 @@ const MAX_EXPONENT = 31;
 /** The largest value a texel can hold. */
 export const MAX_RGB9E5 = MAX_MANTISSA * 2 ** (MAX_EXPONENT - BIAS - BITS);
 
-/** EXT_texture_shared_exponent, section 3.8.x; negative and NaN become 0, too large the largest. */
+/** EXT_texture_shared_exponent, section 3.8.x. Negative values and NaN become 0; too large ones become the largest. */
 export function encodeRgb9e5(r: number, g: number, b: number): number {
   const clamp = (v: number) => (v > 0 ? Math.min(v, MAX_RGB9E5) : 0);
   const [cr, cg, cb] = [clamp(r), clamp(g), clamp(b)];
@@ -29,8 +29,8 @@ export function decodeRgb9e5(texel: number): [number, number, number] {
 }
 
 /**
- * The same colour times 2^exponent, rounded only where the exponent's five bits do not reach: too small loses low bits
- * of the mantissas, too large stops at the largest value.
+ * The same colour times 2^exponent. It is exact unless the result leaves the range of the five exponent bits: a darker
+ * colour loses low bits of its mantissas, a brighter one becomes the largest value.
  */
 export function scaleRgb9e5(texel: number, exponent: number): number {
   if ((texel & 0x7ffffff) === 0) return 0;

@@ -2,7 +2,7 @@
 
 import type { Json } from './messages';
 
-/** What a call is refused with; `data` may hold pointer, op and revision. */
+/** The server has refused a call. */
 export class RpcError extends Error {
   constructor(
     readonly code: number,
@@ -13,7 +13,7 @@ export class RpcError extends Error {
   }
 }
 
-/** The call's connection went away before the answer came: it may or may not have been heard. */
+/** The connection was lost before the answer came; the server may or may not have received the call. */
 export class ConnectionLost extends Error {
   constructor() {
     super('the connection was lost before the answer came');
@@ -58,12 +58,12 @@ export class Rpc {
     this.send({ jsonrpc: '2.0', method, params });
   }
 
-  /** Into a socket that is closing goes nothing, of which the browser would complain: what waits ends with close(). */
+  /** Sends nothing into a closing socket, as browsers complain of that; close() ends the calls that wait. */
   private send(message: object): void {
     if (this.socket.readyState === OPEN) this.socket.send(JSON.stringify(message));
   }
 
-  /** Reads a text frame; what is not a message of JSON-RPC is dropped. */
+  /** Reads a text frame. Drops text that is no JSON-RPC message. */
   receive(text: string): void {
     let message: unknown;
     try {

@@ -1,5 +1,5 @@
-// Binary frames of the protocol ("Tiles" in protocol/README.md): header, checks, pixels. Pure but for inflating; used in
-// the decoding worker and in tests. Whatever is not sound is refused with a reason, never half used.
+// Binary frames of the protocol ("Tiles" in protocol/README.md): header, checks, pixels. Used in the decoding worker
+// and in tests. An unsound frame is refused with a reason, and nothing of it is used.
 
 import { crc32c } from './crc32c';
 import { decodeHalf, encodeRgb9e5, MAX_RGB9E5, scaleRgb9e5 } from './rgb9e5';
@@ -15,7 +15,7 @@ export type PixelFormat = (typeof FORMATS)[number];
 const BYTES_PER_TEXEL: Record<PixelFormat, number> = { rgba16f: 8, rgb9e5: 4, rgba32f: 16, r32ui: 4 };
 
 export interface TileHeader {
-  /** A name of KINDS, or "kind N" for one that this viewer does not know. */
+  /** A name of KINDS, or "kind N" for a kind that this viewer does not know. */
   kind: string;
   format: PixelFormat;
   deflated: boolean;
@@ -36,7 +36,7 @@ export interface TileHeader {
   crc: number;
 }
 
-/** A tile as textures take it: one RGB9E5 word a texel, value = word x 2^exponent; rows in page order. */
+/** A tile as textures take it: one RGB9E5 word a texel, value = word x 2^exponent, rows in the page's order. */
 export interface Tile {
   header: TileHeader;
   texels: Uint32Array;
@@ -97,7 +97,7 @@ function checkHeader(h: TileHeader, frameBytes: number): void {
   if (Math.abs(h.scaleExponent) > 1024) throw new BadTile(`scale exponent ${h.scaleExponent}`);
 }
 
-/** A zlib stream (RFC 1950) of at most `limit` bytes; reads no further than that. */
+/** Inflates a zlib stream (RFC 1950) to exactly `limit` bytes, and reads no further. */
 async function inflate(data: Uint8Array<ArrayBuffer>, limit: number): Promise<Uint8Array> {
   const out = new Uint8Array(limit);
   let filled = 0;
@@ -127,7 +127,7 @@ export async function decodeTile(frame: ArrayBuffer): Promise<Tile> {
   return { header, ...toSharedExponent(header, new DataView(raw.buffer, raw.byteOffset, raw.byteLength)) };
 }
 
-/** One storage for all formats: RGB9E5 is the smallest that WebGL 2 filters, and holds 1/511 of the brightest channel. */
+/** All formats become RGB9E5, the smallest that WebGL 2 filters. It resolves 1/511 of the brightest channel. */
 function toSharedExponent(header: TileHeader, raw: DataView): { texels: Uint32Array; exponent: number } {
   const count = header.width * header.height;
   const texels = new Uint32Array(count);
@@ -142,7 +142,7 @@ function toSharedExponent(header: TileHeader, raw: DataView): { texels: Uint32Ar
   }
   const half = header.format === 'rgba16f';
   const number = half ? (at: number) => decodeHalf(raw.getUint16(at, true)) : (at: number) => raw.getFloat32(at, true);
-  // Of what was passed on before it came the storage knows no sign: its size is what there is to see.
+  // RGB9E5 has no sign. Unshot light is negative where more was shot than has arrived; the view shows its amount.
   const read = header.kind === 'unshot' ? (at: number) => Math.abs(number(at)) : number;
   const [channel, stride] = half ? [2, 8] : [4, 16];
   let largest = 0;
@@ -157,7 +157,7 @@ function toSharedExponent(header: TileHeader, raw: DataView): { texels: Uint32Ar
   return { texels, exponent: exponent + header.scaleExponent };
 }
 
-/** Numbers of patches are names, not amounts: each gets a colour of its own. */
+/** The number of a patch is a name, not an amount, so each patch gets a colour of its own. */
 function hashColour(id: number): number {
   const hash = Math.imul(id ^ (id >>> 15), 0x2c1b3c6d) ^ Math.imul(id + 1, 0x9e3779b1);
   const part = (shift: number) => 0.15 + (0.7 * ((hash >>> shift) & 255)) / 255;
@@ -168,7 +168,7 @@ function finite(v: number): number {
   return Number.isFinite(v) ? v : 0;
 }
 
-/** The tile's texels for a texture whose values are stored x 2^exponent. */
+/** The tile's texels for a texture with value = texel x 2^exponent. */
 export function rescaled(tile: Tile, exponent: number): Uint32Array {
   const shift = tile.exponent - exponent;
   return shift === 0 ? tile.texels : tile.texels.map((texel) => scaleRgb9e5(texel, shift));

@@ -1,13 +1,13 @@
-// Frames from the socket go to the decoding worker, and come back as tiles for the set they were sent for.
+// Passes frames from the socket to the decoding worker, and the decoded tiles to the pages that they were sent for.
 
-import type { LightmapSet } from '../view/lightmap_set';
+import type { LightmapSet } from '../view/light/lightmap_set';
 import { KINDS } from '../protocol/tile_frame';
 import type { DecodeReply, DecodeRequest } from './tile_worker';
 
 export interface TileFeedEvents {
-  /** The set that tiles of a kind belong to now. */
+  /** The pages that tiles of a kind belong to now. */
   set(kind: string): LightmapSet | undefined;
-  /** A frame was not used; without a reason: its set is gone. */
+  /** A frame was not used. Without a `reason`, its pages are gone. */
   dropped(bytes: number, reason?: string): void;
   queued(): void;
 }
@@ -32,7 +32,7 @@ export class TileFeed {
     this.worker.postMessage(request, [frame]);
   }
 
-  /** Calls when everything pushed so far was decoded. */
+  /** Calls `act` once all frames that were pushed so far are decoded. */
   afterAll(act: () => void): void {
     if (this.done === this.sent) act();
     else this.waiting.push({ after: this.sent, act });
@@ -43,7 +43,7 @@ export class TileFeed {
     this.sets.delete(ticket);
     this.done = ticket;
     const kind = tile?.header.kind;
-    // Pages may have been laid out anew while it was decoded.
+    // There may be a new layout since the frame was pushed.
     if (tile && set && kind && this.events.set(kind) === set) {
       set.enqueue(tile, bytes);
       this.events.queued();

@@ -1,4 +1,4 @@
-// Decodes tiles off the main thread, one after the other, so that they come out in the order they came in.
+// Decodes tiles off the main thread, one after the other, so that they keep their order.
 
 import { decodeTile, type Tile } from '../protocol/tile_frame';
 
@@ -14,7 +14,7 @@ export interface DecodeReply {
   reason?: string;
 }
 
-/** What there is of a worker's scope; the compiler knows the page's only. */
+/** The part of a worker's scope that is used here; the compiler knows only the page's scope. */
 interface WorkerScope {
   onmessage: (event: MessageEvent<DecodeRequest>) => void;
   postMessage(reply: DecodeReply, transfer?: Transferable[]): void;

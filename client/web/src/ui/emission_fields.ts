@@ -1,8 +1,9 @@
-// Emission as two fields show it: a colour of 8 bits a channel, and nits in a few digits. What nobody wrote anew there
-// stays as exact as it is in the document. Pure functions.
+// Emission as two fields: a colour of 8 bits a channel, and a strength in nits of a few digits. A field that nobody
+// changed keeps the exact value of the document. Pure functions.
 
 import type { GltfMaterial, Vec3 } from '../document/gltf';
-import { fromHex, parseNumber, toHex } from './dom';
+import { fromHex, toHex } from '../page/colours';
+import { parseNumber } from '../page/numbers';
 
 export interface EmissionFields {
   colour: string;
@@ -21,8 +22,8 @@ function emissionOf(material: GltfMaterial): Emission & { brightest: number } {
 }
 
 /**
- * The factor's brightest channel belongs to the strength, so that both can be changed by themselves. The luminance of a
- * colour is less than that.
+ * The fields of a material. The strength contains the factor's brightest channel, so that the user can change colour
+ * and strength independently; the luminance is therefore below the strength.
  */
 export function emissionFields(material: GltfMaterial): EmissionFields {
   const { factor, strength, brightest } = emissionOf(material);
@@ -32,7 +33,7 @@ export function emissionFields(material: GltfMaterial): EmissionFields {
   };
 }
 
-/** What the fields of `material` mean after somebody wrote into them; undefined: no strength. */
+/** The emission that the user has written into the fields of `material`; undefined: the strength is no valid number. */
 export function emissionWritten(material: GltfMaterial, fields: EmissionFields): Emission | undefined {
   const before = emissionOf(material);
   const shown = emissionFields(material);
@@ -40,6 +41,6 @@ export function emissionWritten(material: GltfMaterial, fields: EmissionFields):
   if (!(nits >= 0)) return undefined;
   if (fields.colour === shown.colour && before.brightest > 0)
     return { factor: before.factor, strength: fields.nits === shown.nits ? before.strength : nits / before.brightest };
-  // A black factor has no colour of its own: the first strength gives it the one that is shown.
+  // A black factor has no colour: with its first strength it takes the colour of the field.
   return nits > 0 || before.brightest > 0 ? { factor: fromHex(fields.colour), strength: nits } : before;
 }

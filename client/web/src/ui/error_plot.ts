@@ -1,7 +1,7 @@
-// Error against time, both logarithmic, as the solve goes on.
+// The plot of the solve's error against time, on logarithmic axes.
 
 import type { Progress } from '../protocol/messages';
-import { h } from './dom';
+import { h } from '../page/dom';
 
 export interface Sample {
   seconds: number;
@@ -29,40 +29,40 @@ export class ErrorPlot {
 
   constructor() {
     new ResizeObserver(() => this.draw()).observe(this.element);
-    // A canvas does not take up the page's new colours by itself.
+    // Unlike elements, a canvas does not change its colours with the theme.
     new MutationObserver(() => this.draw()).observe(document.documentElement, { attributeFilter: ['data-theme'] });
     matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => this.draw());
   }
 
-  /** To be drawn with the next draw(). */
+  /** The next draw() shows it. */
   add(progress: Progress): void {
     const last = this.samples.at(-1);
-    // Solve time runs backwards when an edit or another scene begins a new solve.
+    // Solve time steps back when an edit or another scene begins a new solve.
     if (last && progress.seconds < last.seconds) this.samples = [];
     if (!(progress.seconds > 0) || progress.seconds === last?.seconds) return;
     this.samples.push({ seconds: progress.seconds, ...progress.error });
-    // Samples lie evenly in time, the plot is logarithmic: every second one is enough where there are many.
+    // Samples are even in time, but the axis is logarithmic: of many old samples every second one is enough.
     if (this.samples.length > MOST) this.samples = this.samples.filter((_, i) => i % 2 === 0 || i > MOST - 50);
   }
 
-  /** Of the same solve, what came before the page did and while it was away. To be drawn with the next draw(). */
+  /** Samples of the same solve from before the page was opened, or while it was away. The next draw() shows them. */
   addHistory(history: readonly Sample[]): void {
     this.samples = withHistory(this.samples, history);
   }
 
-  /** What is drawn, by ascending time. */
+  /** The samples of the plot, by ascending time. */
   get drawn(): readonly Sample[] {
     return this.samples;
   }
 
-  /** To be drawn with the next draw(). */
+  /** The next draw() shows it. */
   setTarget(target: number): void {
     this.target = target;
   }
 
   draw(): void {
     const { clientWidth, clientHeight } = this.element;
-    // Letters and margins are those of a page of 14 pixels, and grow with it.
+    // Lengths are for a page whose letters have 14 pixels, and grow with the letters.
     const unit = parseFloat(getComputedStyle(document.documentElement).fontSize) / 14;
     const [width, height] = [clientWidth / unit, clientHeight / unit];
     const context = this.element.getContext('2d');
@@ -134,7 +134,7 @@ export class ErrorPlot {
     context.lineWidth = key === 'total' ? 2 : 1.2;
     for (const sample of this.samples) if (sample[key] > 0) context.lineTo(x.at(sample.seconds), y.at(sample[key]));
     context.stroke();
-    // A solve that is done before it was first told of has one sample, which makes no line.
+    // A very short solve has only one sample, which makes no line, so the last sample gets a dot.
     const last = this.samples.at(-1);
     if (!last || !(last[key] > 0)) return;
     context.beginPath();
@@ -144,7 +144,7 @@ export class ErrorPlot {
   }
 }
 
-/** As far as a server's samples reach they stand in the place of the page's own, which may have gaps. */
+/** The server's samples replace the page's own, which may have gaps, for the time that they cover. */
 export function withHistory(own: readonly Sample[], history: readonly Sample[]): Sample[] {
   const [first, last] = [history[0], history.at(-1)];
   if (!first || !last) return [...own];
@@ -152,13 +152,13 @@ export function withHistory(own: readonly Sample[], history: readonly Sample[]):
   return [...before, ...history, ...own.filter(({ seconds }) => seconds > last.seconds)];
 }
 
-/** What the scale has to hold: all that the legend names, down to where a part is nothing beside the total. */
+/** The values that the axis has to show: all of the legend, but no part that is negligible beside the total. */
 export function errorsShown(samples: readonly Sample[]): number[] {
   const parts = samples.flatMap(({ sampling, residual }) => [sampling, residual]);
   return [...samples.map(({ total }) => total), ...parts.filter((part) => part > 1e-4)];
 }
 
-/** The middle of a text, so moved that the canvas does not cut it off at its left or right. */
+/** The middle of a text, moved so that the canvas cuts nothing of the text off at the left or right. */
 export function within(middle: number, textWidth: number, width: number): number {
   return Math.max(textWidth / 2, Math.min(middle, width - textWidth / 2));
 }
@@ -168,16 +168,16 @@ interface LogScale {
   ticks: number[];
 }
 
-/** Powers of ten alone; finer ones where those are too few to read a logarithmic scale by. */
+/** Ticks of a decade. The first that give enough ticks are taken. */
 const STEPS = [[1], [1, 2, 5], [1, 2, 3, 5, 7], [1, 1.5, 2, 3, 4, 5, 7]];
 const FEWEST_TICKS = 3;
-/** Texts of ticks have room beside each other, as a part of the scale. */
+/** Least distance between ticks, as a part of the axis: their texts need room. */
 const LEAST_GAP = 0.15;
 
-/** Of a logarithmic scale. */
+/** Ticks of a logarithmic axis. */
 export function ticksBetween(low: number, high: number): number[] {
   let ticks: number[] = [];
-  // Where one after the other there is no room for powers of ten, every second or third of them.
+  // A long axis has room only for every second or third power of ten.
   const stride = Math.max(1, Math.ceil(LEAST_GAP * Math.log10(high / low)));
   for (const steps of STEPS) {
     const finer: number[] = [];
@@ -191,7 +191,7 @@ export function ticksBetween(low: number, high: number): number[] {
   return ticks;
 }
 
-/** Holds all values and `atLeast`, with a little room beyond. */
+/** An axis for all values and `atLeast`, with a little room at its ends. */
 function scale(values: number[], atLeast: number, from: number, to: number): LogScale {
   const good = values.filter((v) => v > 0 && Number.isFinite(v));
   const least = 0.9 * Math.min(atLeast, ...good);

@@ -1,10 +1,10 @@
-// The list of keys.
+// The list of keys, as a dialog.
 
-import { button, h } from './dom';
+import { button, h } from '../page/dom';
 
 const KEYS: [string, string][] = [
   ['Drag, wheel, right drag', 'orbit, zoom, pan; by touch: one finger, pinch, two fingers'],
-  ['Arrows, + −', 'orbit, zoom; in the first person: look about; of pages: pan, zoom'],
+  ['Arrows, + −', 'orbit, zoom; in the first person: look around; on pages: pan, zoom'],
   ['W A S D, Q E', 'move, down, up'],
   ['V', 'switch between orbit and first person'],
   ['F, Shift+F', 'frame everything, frame the selection'],
@@ -20,15 +20,15 @@ const KEYS: [string, string][] = [
   ['Delete', 'remove the selection'],
   ['Ctrl+Z, Ctrl+Shift+Z', 'undo, redo'],
   ['Space', 'pause or resume the solve'],
-  ['P, H', 'show or hide the panel, everything but the picture'],
-  ['Escape', 'take back what is being dragged; clear the selection'],
+  ['P, H', 'show or hide the panel; everything but the picture'],
+  ['Escape', 'cancel the drag; clear the selection'],
   ['?', 'this list'],
 ];
 
 export function makeHelp(): HTMLDialogElement {
   const dialog = h('dialog', { class: 'card help', 'aria-label': 'Keys' });
   dialog.append(
-    // The button comes first: it takes the focus, and what has the focus is scrolled to.
+    // The button comes first, because it takes the focus and the dialog scrolls to it.
     h(
       'header',
       {},

@@ -1,10 +1,10 @@
-// What keys do, outside of text fields.
+// Listens to keys outside of text fields.
 
 export interface KeyActions {
   camera(event: KeyboardEvent, down: boolean): boolean;
   turn(right: number, up: number): void;
   zoom(factor: number): void;
-  /** A key by its name ("f", "F", "?"); false: it means nothing. */
+  /** A key by its name ("f", "F", "?"). False: the key has no meaning. */
   press(key: string, event: KeyboardEvent): boolean;
 }
 

@@ -1,13 +1,16 @@
-// The scale of a false-colour picture: what colour means how many lux, or which mip.
+// The legend of a false-colour picture, and the card with the light meter's reading.
 
-import { MIP_STOPS, NOTHING, paletteCss } from '../view/palette';
-import { h, measured, readable, withError } from './dom';
+import { MIP_STOPS, NOTHING, paletteCss } from '../view/looks/palette';
+import { h } from '../page/dom';
+import { measured, readable, withError } from '../page/numbers';
 
 const LABELS = 5;
-/** Of those that are written as multiples of powers of ten. */
+/** Labels with powers of ten are longer, so there is room for fewer. */
 const LONG_LABELS = 3;
 
-/** Of colours on a logarithmic scale. The first and the last colour are those of all that lies beyond it, too, as lamps do. */
+/**
+ * Labels of a logarithmic scale. Its first and last colour also stand for all values beyond the scale, such as lamps.
+ */
 export function scaleLabels(low: number, high: number): string[] {
   const labels = (count: number) =>
     Array.from({ length: count }, (_, i) => {
@@ -38,7 +41,7 @@ export class Legend {
     this.fill(`${title}, ${unit}`, paletteCss('to right'), scaleLabels(low, high));
   }
 
-  /** Where there is nothing to be scaled by. */
+  /** There is no value yet, or none above 0, so there is no scale. */
   showNothing(title: string, unit: string, why: string): void {
     this.fill(`${title}, ${unit}`, `rgb(${NOTHING.map((c) => Math.round(255 * c)).join(' ')})`, [why]);
   }
@@ -71,7 +74,7 @@ interface Point {
   y: number;
 }
 
-/** Of a card at the pointer, in a page of a size: its left and top, clear of something else where that can be. */
+/** Left and top of a card at the pointer, within the page and, if possible, clear of `other`. */
 export function besidePointer(pointer: Point, card: Size, page: Size, other?: Point & Size): Point {
   const right = Math.min(Math.max(8, pointer.x + 18), Math.max(8, page.width - card.width - 8));
   const left = Math.max(8, pointer.x - card.width - 14);
@@ -103,17 +106,17 @@ export class MeterCard {
     this.more,
   );
 
-  /** On the place that is read, where no pointer shows it. */
+  /** Marks the place that is read when no pointer shows it. */
   readonly mark = h('div', { class: 'meter-mark', hidden: true });
 
-  /** `legend`: what it is not to cover. */
+  /** `legend`: the card avoids it. */
   constructor(private readonly legend: HTMLElement) {}
 
   hide(): void {
     this.element.hidden = this.mark.hidden = true;
   }
 
-  /** `light`: lux, or why there is none. `error`: lux, either side. */
+  /** `light`: lux, or the reason why there is none. `error`: standard error, lux. */
   show(
     x: number,
     y: number,

@@ -1,4 +1,4 @@
-// The panel "Scene": its objects, and what can be changed of the selected one.
+// The panel "Scene": a list of objects, and an editor of the selected one.
 
 import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
@@ -14,7 +14,9 @@ import {
   type Vec4,
 } from '../document/gltf';
 import type { Placement } from '../document/edits';
-import { button, checkbox, field, fromHex, h, parseNumber, row, section, toHex } from './dom';
+import { fromHex, toHex } from '../page/colours';
+import { button, buttons, panel, checkbox, field, h, row, section } from '../page/dom';
+import { parseNumber } from '../page/numbers';
 import { emissionFields, emissionWritten } from './emission_fields';
 
 export interface Selection {
@@ -34,16 +36,16 @@ export interface ScenePanelActions {
   frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
-  /** `wanted`: what the field takes. */
+  /** `wanted`: the values that the field accepts. */
   notAccepted(text: string, wanted: string): void;
 }
 
 const MOST_LISTED = 400;
-/** So many are seen at a glance. */
+/** So many objects need no search field. */
 const FEW = 12;
 const MOST_LETTERS = 200;
 
-/** What a narrow field has room for: four digits, hundredths of what is large, and nothing where there is but rounding. */
+/** A number for a narrow field: four digits; hundredths of large numbers; 0 where rounding has left less than that. */
 export function briefly(value: number): string {
   const size = Math.abs(value);
   if (size < 1e-9) return '0';
@@ -51,7 +53,7 @@ export function briefly(value: number): string {
   return String(Number(size < 100 ? value.toFixed(Math.min(4, 3 - Math.floor(Math.log10(size)))) : value.toFixed(2)));
 }
 
-/** What a field takes, and how it is asked for. */
+/** The values that a field accepts, and their name in the message about others. */
 const ANY_NUMBER = { wanted: 'a number', isGood: (value: number) => Number.isFinite(value) };
 
 interface ListEntry {
@@ -74,7 +76,7 @@ export class ScenePanel {
   private selection: Selection | undefined;
   private revealed: number | undefined;
   private edited: number | undefined;
-  /** Something is being written that was not sent yet. */
+  /** The user is writing a value that was not sent yet. */
   private typing = false;
   private materialsOf: (node: number) => number[] = () => [];
 
@@ -85,16 +87,12 @@ export class ScenePanel {
       if (chosen) actions.loadFile(chosen);
       file.value = '';
     };
-    this.element = h(
-      'div',
-      {},
+    this.element = panel(
       section(
         'Objects',
         this.findRow,
         this.list,
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Add lamp', () => actions.addLamp(), { title: 'Add a point light in front of the camera (L)' }),
           button('Open scene…', () => file.click(), { title: 'Or drop a .glb on the page' }),
           file,
@@ -103,14 +101,14 @@ export class ScenePanel {
       this.editor,
     );
     this.find.addEventListener('input', () => this.showList());
-    // Before the field hears of it: what it sends would set all fields anew.
+    // Captured before the field hears of the event, as the value that the field sends would reset all fields.
     this.editor.addEventListener('input', () => (this.typing = true), true);
-    // A colour is being chosen from when it is asked for until its picker is closed.
+    // The user chooses a colour from the click that opens its picker until the picker closes.
     this.editor.addEventListener('click', ({ target }) => {
       if ((target as HTMLInputElement).type === 'color') this.typing = true;
     });
     this.editor.addEventListener('change', () => (this.typing = false));
-    // What was selected while another tab was open is scrolled to when this one is.
+    // The list cannot scroll to the selection while another tab is open.
     new ResizeObserver(() => this.revealSelection()).observe(this.list);
   }
 
@@ -126,8 +124,8 @@ export class ScenePanel {
   }
 
   /**
-   * Shows other people's and our own edits, and what a refused one snaps back to; leaves alone what the user is typing
-   * and a colour that is being chosen.
+   * Shows the document as it is after everyone's edits and after refusals. A value that the user is typing, and a
+   * colour that the user is choosing, stay as they are.
    */
   refresh(): void {
     this.showList();
@@ -146,7 +144,7 @@ export class ScenePanel {
       visible: isVisible(this.gltf, node),
       light: lightOf(this.gltf, node) !== undefined,
     }));
-    // A drag changes the document many times a second, and the list not at all.
+    // A drag changes the document many times a second, but it does not change the list.
     const text = JSON.stringify([listed, found.length]);
     if (text !== this.listText) this.fillList(listed, found.length);
     this.listText = text;
@@ -177,7 +175,7 @@ export class ScenePanel {
     if (had) this.entries.get(this.selection?.node ?? -1)?.focus();
   }
 
-  /** Scrolls the list, and nothing but the list, to an object that was just selected or just came. */
+  /** Scrolls the list, and nothing but the list, to an object that was just selected or added. */
   private revealSelection(): void {
     const element = this.list.querySelector<HTMLElement>('[aria-current]')?.parentElement;
     const node = element ? this.selection?.node : undefined;
@@ -189,7 +187,7 @@ export class ScenePanel {
       this.list.scrollTop = top - this.list.clientHeight / 2;
   }
 
-  /** Who was at one of its controls is at the same one afterwards. */
+  /** Makes the editor's controls anew; the one that has the focus keeps it. */
   private showEditor(): void {
     const controls = () => [...this.editor.querySelectorAll<HTMLElement>('input, button')];
     const at = controls().indexOf(document.activeElement as HTMLElement);
@@ -218,9 +216,7 @@ export class ScenePanel {
           checkbox(isVisible(gltf, selection.node), (on) => this.actions.setVisible(selection.node, on)),
         ),
         ...this.placement(selection.node),
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Frame object', () => this.actions.frameSelection(), { title: 'Shift+F' }),
           button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
         ),
@@ -245,7 +241,7 @@ export class ScenePanel {
           const euler = new Euler(...([x, y, z].map((a) => MathUtils.degToRad(a)) as Vec3), 'YXZ');
           this.actions.setPlacement(index, { rotation: new Quaternion().setFromEuler(euler).toArray() as Vec4 });
         }),
-      // A scale of 0 makes a sheet of a body: faces that look both ways in one plane, which no light can tell apart.
+      // A scale of 0 flattens a body: its front and back faces would lie in one plane.
       scale: () =>
         this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale }), {
           wanted: 'a number other than 0',
@@ -256,7 +252,7 @@ export class ScenePanel {
   }
 
   private vector(label: string, value: Vec3, changed: (value: Vec3) => void, accepts = ANY_NUMBER): HTMLElement {
-    // What nobody wrote anew stays as exact as it was, whatever there is room for, and is not asked whether it is good.
+    // A number that nobody changed keeps its exact value, and is accepted whatever it is.
     const isKept = (input: HTMLInputElement, i: number) => input.value === briefly(value[i]!);
     const read = (input: HTMLInputElement, i: number) => (isKept(input, i) ? value[i]! : parseNumber(input.value));
     const isBad = (input: HTMLInputElement, i: number) => !isKept(input, i) && !accepts.isGood(read(input, i));
@@ -330,13 +326,13 @@ export class ScenePanel {
     return section(`Light: ${light.type}`, field('Colour', colour), field(`Intensity, ${unit}`, strength));
   }
 
-  /** What it was before stands there again. */
+  /** Restores the field's last good value. */
   private refuse(input: HTMLInputElement, wanted = 'a number'): void {
     this.actions.notAccepted(input.value, wanted);
     this.showEditor();
   }
 
-  /** Sends while the colour is being chosen; the gesture ends when the chooser closes. */
+  /** Sends colours while the user is choosing. The gesture ends when the picker closes. */
   private colour(value: string, changed: (hex: string) => void): HTMLInputElement {
     const input = h('input', { type: 'color', value });
     input.oninput = () => changed(input.value);

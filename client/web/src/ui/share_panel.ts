@@ -1,18 +1,23 @@
-// The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
+// The panel "Share": a link to the view, the last edit as a command, and files to download.
 
 import { LONGEST_NAME } from '../protocol/page_name';
-import { button, checkbox, field, h, section } from './dom';
+import { button, buttons, panel, checkbox, field, h, section } from '../page/dom';
 
-export interface SharePanelActions {
-  /** What the user is called, and how the page is called where that is not said. */
+export type Download = 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot';
+
+export interface PeopleActions {
+  /** What the user is called, and how others see the page of a user who has not said so. */
   name: { person: string; unnamed: string };
   setName(person: string): void;
-  /** What the box says at first. */
+  /** Whether the user shares the camera when the page opens. */
   sharing: boolean;
   setSharing(on: boolean): void;
+}
+
+export interface SharePanelActions extends PeopleActions {
   copyLink(): void;
   copyEdit(form: 'command' | 'json'): void;
-  download(what: 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot'): void;
+  download(what: Download): void;
 }
 
 export class SharePanel {
@@ -26,14 +31,10 @@ export class SharePanel {
       button('Copy as command', () => actions.copyEdit('command'), { disabled: true }),
       button('Copy JSON', () => actions.copyEdit('json'), { disabled: true }),
     ];
-    this.element = h(
-      'div',
-      {},
+    this.element = panel(
       section(
         'This view',
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Copy link', () => actions.copyLink()),
           button('Save picture', () => actions.download('png')),
         ),
@@ -47,12 +48,10 @@ export class SharePanel {
         ),
         h('p', { class: 'dim' }, 'Viewers who share their cameras see where the others look from.'),
       ),
-      section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
+      section('Last edit', this.edit, buttons(...this.copies)),
       section(
         'Download',
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           button('Lit scene (.glb)', () => actions.download('glb'), { title: 'With lightmap coordinates' }),
           button('Baked scene (.glb)', () => actions.download('unlit'), { title: 'For any glTF viewer' }),
           button('Lightmaps (.exr)', () => actions.download('exr'), { title: 'Irradiance in lux, 32-bit float' }),
@@ -64,7 +63,7 @@ export class SharePanel {
   }
 
   private nameField({ name, setName }: SharePanelActions): HTMLElement {
-    const title = `Shown with what you do; without one that is “${name.unnamed}”`;
+    const title = `Others see it with your edits; without a name they see “${name.unnamed}”`;
     const input = h('input', {
       type: 'text',
       value: name.person,

@@ -1,20 +1,29 @@
-// The panel "Solve": how far the light is, and how far it shall go.
+// The panel "Solve": the progress and the target of the solve.
 
-import type { ErrorSample, Progress, Settings } from '../protocol/messages';
-import { button, checkbox, field, h, inField, parseNumber, percent, readable, section } from './dom';
+import type { ErrorSample, Method, Progress, Settings } from '../protocol/messages';
+import { button, buttons, panel, checkbox, field, h, section, select } from '../page/dom';
+import { inField, parseNumber, percent, readable } from '../page/numbers';
 import { ErrorPlot } from './error_plot';
-import { Spaced } from './spaced';
+import { Spaced } from '../page/spaced';
 
 export interface SolvePanelActions {
   pauseOrResume(): void;
   restart(): void;
   configure(settings: Partial<Settings>): void;
-  /** `wanted`: what the field takes. */
+  /** `wanted`: the values that the field accepts. */
   notAccepted(text: string, wanted: string): void;
 }
 
-/** What a solve goes through by itself; what else it comes to, or from, somebody waits for. */
+/**
+ * States that a solve goes through by itself. Changes to and from other states show at once: somebody waits for them.
+ */
 const ITS_OWN = ['solving', 'converged', 'limited', 'timeLimit'];
+
+const METHODS: { id: Method; label: string }[] = [
+  { id: 'gather', label: 'Gather (default)' },
+  { id: 'shooting', label: 'Progressive shooting' },
+  { id: 'paper', label: 'Lum, Ma and Max 2002' },
+];
 
 const STATES: Record<string, string> = {
   empty: 'No scene',
@@ -27,17 +36,13 @@ const STATES: Record<string, string> = {
   failed: 'Failed',
 };
 
-export function stateName(state: string): string {
-  return STATES[state] ?? state;
-}
-
-/** The state for people, and of a load how much of it is done. */
+/** The state for people, with the progress of a load. */
 export function stateText({ state, fraction }: Pick<Progress, 'state' | 'fraction'>): string {
-  if (state !== 'loading' || fraction === undefined) return stateName(state);
-  return `${stateName(state)}, ${Math.round(100 * fraction)} %`;
+  const name = STATES[state] ?? state;
+  return state !== 'loading' || fraction === undefined ? name : `${name}, ${Math.round(100 * fraction)} %`;
 }
 
-/** How far the bar is, in [0, 1]: towards the target error on a logarithmic scale, or towards the end of a load. */
+/** Length of the bar in [0, 1]: towards the target error on a logarithmic scale, or towards the end of a load. */
 export function barValue(progress: Progress, firstError: number, target: number): number {
   if (progress.state === 'converged') return 1;
   if (progress.state === 'loading') return progress.fraction ?? 0;
@@ -66,45 +71,31 @@ export class SolvePanel {
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
   private readonly bothSides: HTMLInputElement;
+  private readonly method: HTMLSelectElement;
   private settings: Settings | undefined;
   private progress: Progress | undefined;
   private readonly spaced = new Spaced(() => this.showProgress());
   private typing: HTMLInputElement | undefined;
   private firstError = 1;
 
-  constructor(actions: SolvePanelActions) {
+  constructor(private readonly actions: SolvePanelActions) {
     this.pause = button('Pause', () => actions.pauseOrResume());
-    this.target = h('input', { type: 'text', class: 'number', inputMode: 'decimal' });
-    this.target.onchange = () => {
-      this.typing = undefined;
-      const value = parseNumber(this.target.value.replace('%', '')) / 100;
-      if (value > 0 && value <= 1) return actions.configure({ targetError: value });
-      actions.notAccepted(this.target.value, 'a percentage above 0, up to 100');
-      this.showSettings();
-    };
-    this.texels = h('input', { type: 'text', class: 'number', inputMode: 'numeric' });
-    this.texels.onchange = () => {
-      this.typing = undefined;
-      const value = Math.round(parseNumber(this.texels.value));
-      if (value >= 1) return actions.configure({ texels: value });
-      actions.notAccepted(this.texels.value, 'a number, 1 or more');
-      this.showSettings();
-    };
+    this.target = this.numberField('decimal', 'a percentage above 0, up to 100', (text) => {
+      const value = parseNumber(text.replace('%', '')) / 100;
+      return value > 0 && value <= 1 ? { targetError: value } : undefined;
+    });
+    this.texels = this.numberField('numeric', 'a number, 1 or more', (text) => {
+      const value = Math.round(parseNumber(text));
+      return value >= 1 ? { texels: value } : undefined;
+    });
     this.bothSides = checkbox(false, (on) => actions.configure({ doubleSided: on }));
-    for (const input of [this.target, this.texels]) {
-      input.oninput = () => (this.typing = input);
-      input.onblur = () => (this.typing = undefined);
-    }
-    this.element = h(
-      'div',
-      {},
+    this.method = select(METHODS, 'gather', (id) => actions.configure({ method: id as Method }));
+    this.element = panel(
       section(
         'Progress',
         this.bar,
         this.facts,
-        h(
-          'div',
-          { class: 'buttons' },
+        buttons(
           this.pause,
           button('Restart', () => actions.restart()),
         ),
@@ -115,6 +106,7 @@ export class SolvePanel {
         field('Error, %', this.target),
         field('Texels, approx.', this.texels),
         field('Light both sides of all surfaces', this.bothSides),
+        field('Method', this.method),
       ),
       this.warnings,
     );
@@ -130,7 +122,7 @@ export class SolvePanel {
     else this.spaced.now();
   }
 
-  /** What the server remembers of the solve that is going on. */
+  /** The server's samples of the present solve. */
   setHistory(samples: readonly ErrorSample[]): void {
     this.plot.addHistory(samples);
     this.spaced.soon();
@@ -171,7 +163,7 @@ export class SolvePanel {
     this.settings = settings;
     this.plot.setTarget(settings.targetError);
     this.showSettings();
-    this.showProgress(); // what is done may stay as it is, and nothing be told of it
+    this.showProgress(); // the server may have no progress to tell of
   }
 
   setWarnings(warnings: string[], count: number): void {
@@ -182,12 +174,32 @@ export class SolvePanel {
     );
   }
 
-  /** What stands in the fields: the server's, also after it has refused others; not where somebody is typing. */
+  /** Puts the server's settings into the fields, but not into the one that the user is typing in. */
   showSettings(): void {
     if (!this.settings) return;
     if (this.typing !== this.target) this.target.value = inField(100 * this.settings.targetError);
     if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
     this.bothSides.checked = this.settings.doubleSided;
+    this.method.value = this.settings.method;
+  }
+
+  /** `settingsOf`: the settings that a text means; undefined: it means none. `wanted`: the texts that mean some. */
+  private numberField(
+    inputMode: string,
+    wanted: string,
+    settingsOf: (text: string) => Partial<Settings> | undefined,
+  ): HTMLInputElement {
+    const input = h('input', { type: 'text', class: 'number', inputMode });
+    input.oninput = () => (this.typing = input);
+    input.onblur = () => (this.typing = undefined);
+    input.onchange = () => {
+      this.typing = undefined;
+      const settings = settingsOf(input.value);
+      if (settings) return this.actions.configure(settings);
+      this.actions.notAccepted(input.value, wanted);
+      this.showSettings();
+    };
+    return input;
   }
 
   private showFacts(facts: [string, string][]): void {

@@ -1,22 +1,28 @@
-// Short notes that go by themselves; the same note twice is one note. Read out by screen readers. What failed stays
-// however much others do meanwhile.
+// Short notes that disappear by themselves. Screen readers read them out. A note about a failure is not pushed out by
+// notes about what others do.
 
 import { plainText } from '../protocol/page_name';
-import { button, h } from './dom';
+import { button, h } from '../page/dom';
 
 export type Tone = 'info' | 'good' | 'bad';
+
+/** What the parts of the viewer tell the user. */
+export interface Notes {
+  show(text: string, tone?: Tone): void;
+  showOnce(text: string): void;
+}
 
 const SHOWN_MS: Record<Tone, number> = { info: 4000, good: 3000, bad: 9000 };
 const MOST = 4;
 const MOST_LETTERS = 400;
 
-export class Toasts {
+export class Toasts implements Notes {
   readonly element = h('div', { class: 'toasts', role: 'status', 'aria-live': 'polite' });
   private readonly timers = new WeakMap<Element, ReturnType<typeof setTimeout>>();
 
   show(whole: string, tone: Tone = 'info'): void {
     const text = shortened(whole);
-    this.find(text)?.remove(); // what one does again is answered, and read out, again
+    this.find(text)?.remove(); // a new element is read out again, as the user has acted again
     const toast = h('div', { class: `toast ${tone}` }, h('span', {}, text));
     toast.append(button('×', () => toast.remove(), { 'aria-label': 'Dismiss' }));
     this.element.append(toast);
@@ -25,8 +31,8 @@ export class Toasts {
   }
 
   /**
-   * Of what others do: what they drag is told of thirty times a second, and would be read out as often if it were put
-   * there anew each time.
+   * For actions of others. A note that is there already stays, as screen readers would otherwise read it thirty times a
+   * second while somebody drags.
    */
   showOnce(whole: string): void {
     const same = this.find(shortened(whole));
@@ -38,7 +44,7 @@ export class Toasts {
     return [...this.element.children].find((note) => note.firstChild?.textContent === text);
   }
 
-  /** The oldest of those that tell of nothing wrong, but for the newest of all. */
+  /** The oldest note that is about no failure; the newest of all does not count. */
   private leastOfAll(): Element {
     const notes = [...this.element.children];
     return notes.slice(0, -1).find((note) => !note.classList.contains('bad')) ?? notes[0]!;
@@ -53,7 +59,7 @@ export class Toasts {
   }
 }
 
-/** Names of a scene may be as long as they like. */
+/** A scene may contain names of any length. */
 function shortened(text: string): string {
   return plainText(text.length > MOST_LETTERS ? `${text.slice(0, MOST_LETTERS)}…` : text);
 }

@@ -1,7 +1,8 @@
-// The panel "View": what is shown and how bright, from where.
+// The panel "View": what the picture shows, how brightly, and from where.
 
-import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/view_modes';
-import { button, checkbox, field, h, inField, parseNumber, pressed, readable, section, select } from './dom';
+import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/looks/view_modes';
+import { button, checkbox, field, h, panel, pressed, section, select } from '../page/dom';
+import { inField, parseNumber, readable } from '../page/numbers';
 
 export const BACKGROUNDS = [
   { id: 'theme', label: 'Same as page' },
@@ -20,7 +21,7 @@ export interface ViewPanelActions {
   setToneCurve(id: string): void;
   setBackground(id: string): void;
   useCamera(index: number): void;
-  /** `wanted`: what the field takes. */
+  /** `wanted`: the values that the field accepts. */
   notAccepted(text: string, wanted: string): void;
 }
 
@@ -54,9 +55,7 @@ export class ViewPanel {
     this.stops.oninput = () => actions.setStops(Number(this.stops.value));
     this.falseRow = field('False colour', this.falseBox);
     this.rangeRow = h('div', {}, field('Auto scale', this.autoRange), field('Scale', this.low, this.high));
-    this.element = h(
-      'div',
-      {},
+    this.element = panel(
       section('Show', grid, this.falseRow, this.rangeRow),
       section(
         'Picture',
@@ -81,7 +80,7 @@ export class ViewPanel {
     this.rangeRow.hidden = !falseColour || mode.falseColour === 'off';
   }
 
-  /** Views that the server streams nothing for say so. */
+  /** Disables the views that the server streams no data for. */
   setAvailable(available: (mode: ViewMode) => boolean): void {
     for (const mode of VIEW_MODES) {
       const element = this.modes.get(mode.id)!;
@@ -103,7 +102,7 @@ export class ViewPanel {
     this.tone.value = id;
   }
 
-  /** A scale that a link asks for; undefined: it follows the light. */
+  /** The scale of a link; undefined: the scale follows the light. */
   setRange(range: [number, number] | undefined): void {
     this.autoRange.checked = range === undefined;
     this.low.disabled = this.high.disabled = range === undefined;

@@ -1,5 +1,5 @@
-// The picture: owns the WebGL context, the scene on the screen and the light on it. Draws only when something changed.
-// Main thread.
+// The picture. It owns the WebGL context, the shown scene and the light on it, and draws only when something has
+// changed. Main thread.
 
 import {
   type Box3,
@@ -12,38 +12,43 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { Gltf } from '../document/gltf';
+import { pause } from '../page/pause';
 import type { Sky } from '../protocol/messages';
-import { Brightness } from './brightness';
-import { CameraRig } from './camera_rig';
-import type { ExposureMeter } from './exposure';
-import { FrameFences } from './frame_fences';
-import { FramePace } from './frame_pace';
-import { Gizmo, type GizmoMode } from './gizmo';
-import { Layouts } from './layouts';
-import type { LightmapSet } from './lightmap_set';
-import { ViewUniforms } from './lit_material';
-import { LitScene } from './lit_scene';
-import { surfaceBox } from './object_box';
-import type { People } from './people';
-import { PagesView } from './pages_view';
-import { pick, pickSurface, readingAt, type Reading } from './picker';
-import { release } from './release';
-import { Screen } from './screen';
-import { SkyBackground, skyOf } from './sky';
-import type { ViewMode } from './view_modes';
-import { WholePrograms } from './whole_programs';
+import { Brightness } from './exposure/brightness';
+import { CameraRig } from './controls/camera_rig';
+import type { ExposureMeter } from './exposure/exposure';
+import { FrameFences } from './frames/frame_fences';
+import { FramePace } from './frames/frame_pace';
+import { Gizmo, type GizmoMode } from './controls/gizmo';
+import { Layouts } from './scene/layouts';
+import type { LightmapSet } from './light/lightmap_set';
+import { ViewUniforms } from './scene/lit_material';
+import { LitScene } from './scene/lit_scene';
+import { surfaceBox } from './scene/object_box';
+import type { People } from './controls/people';
+import { PagesView } from './controls/pages_view';
+import { pick, pickSurface, readingAt, type Reading } from './rays/picker';
+import { Programs } from './scene/programs';
+import { release } from './scene/release';
+import { Screen } from './frames/screen';
+import { SkyBackground, skyOf } from './scene/sky';
+import type { ViewMode } from './looks/view_modes';
 
-/** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
+/**
+ * Time for taking up tiles, of a frame of 16 ms. Longer frames get the same share, but less than a long task (50 ms).
+ */
 const TILE_BUDGET_MS = 5;
 const TILE_SHARE = 0.3;
 const MOST_TILE_MS = 20;
-/** A driver that never says it is done (a lost context) holds nothing up for longer. */
-const MOST_COMPILING_MS = 2000;
-/** What an edit changes shall be seen soon; how sharp comes after it. */
+/** Textures stay sharp at a slant. */
+const MOST_ANISOTROPY = 8;
+/** Between looks whether waiting tiles were taken up. */
+const LOOK_MS = 20;
+/** For so long after an edit a soon picture is worth more than a sharp one. */
 const EDIT_HURRY_MS = 700;
-/** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
+/** Length of the pyramid that stands for another viewer, as a part of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
-/** Of what is looked at around a lamp, of the same. */
+/** Size of the surroundings of a lamp, as a part of the scene's diagonal. */
 const LAMP_ROOM = 0.2;
 
 export interface ViewerEvents {
@@ -61,7 +66,6 @@ export class Viewer {
   readonly uniforms = new ViewUniforms();
   readonly background = new SkyBackground(this.uniforms);
   readonly rig: CameraRig;
-  readonly exposure: ExposureMeter;
   readonly gizmo: Gizmo;
   readonly pagesView: PagesView;
   readonly screen: Screen;
@@ -69,42 +73,36 @@ export class Viewer {
   readonly brightness: Brightness;
   mode: ViewMode | undefined;
   private people: People | undefined;
-  private readonly anisotropy: number;
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
-  private readonly wholePrograms: WholePrograms;
+  private readonly programs: Programs;
   private scale: number;
   private readonly world = new Scene();
   private wanted = true;
   private lastFrame = 0;
   private lost = false;
-  private compiling = false;
-  /** What is shown took the place of another scene's light. */
-  private replaced = false;
-  private document: Gltf = { asset: { version: '2.0' } };
 
   constructor(
-    readonly canvas: HTMLCanvasElement,
+    canvas: HTMLCanvasElement,
     private readonly events: ViewerEvents,
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, powerPreference: 'high-performance' });
-    this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding: they know which values are light
+    this.renderer.toneMapping = NoToneMapping; // our shaders map and encode, as they know which values are light
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
-    // Each answer about a program's text waits for all that the card has to do; a program that fails is heard of anyway.
+    // Each answer about a shader waits for all that the card has to do, and a program that fails is reported anyway.
     this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
-    // Asked for here, where nothing is being drawn that the answer would have to wait for.
-    this.anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
+    // three.js keeps the answer, which later would have to wait for all that is being drawn.
+    this.renderer.capabilities.getMaxAnisotropy();
     this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
     const gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.pace = new FramePace(drawsWithoutCard(gl));
     this.scale = this.pace.firstScale;
     this.fences = new FrameFences(gl);
-    this.screen = new Screen(this.renderer, gl); // which smooths edges
+    this.screen = new Screen(this.renderer, gl);
     this.rig = new CameraRig(canvas, () => this.moved());
     this.layouts = new Layouts(this.renderer, events.used);
-    this.wholePrograms = new WholePrograms(this.renderer, this.rig.camera, this.world, this.uniforms);
+    this.programs = new Programs(this.renderer, this.rig.camera, this.world, this.uniforms);
     this.brightness = this.makeBrightness();
-    this.exposure = this.brightness.exposure;
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
     this.world.add(this.background.mesh);
     this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
@@ -127,38 +125,47 @@ export class Viewer {
     this.brightness.changed();
   }
 
-  /** What is looked at moves, or was changed by hand: it shall be seen soon. */
+  /** The user has moved the camera or an object, and waits to see it. */
   moved(): void {
     this.pace.moved(performance.now());
     this.invalidate();
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.renderer.domElement;
+  }
+
+  get exposure(): ExposureMeter {
+    return this.brightness.exposure;
   }
 
   get shown(): LitScene | undefined {
     return this.layouts.shown;
   }
 
-  /** The set that tiles of irradiance belong to. */
+  /** The pages that tiles of irradiance belong to. */
   get set(): LightmapSet | undefined {
     return this.layouts.set;
   }
 
-  /** Of the quantity that is looked at besides irradiance. */
+  /** The pages of the quantity that is shown besides irradiance. */
   get dataSet(): LightmapSet | undefined {
     return this.layouts.dataSet;
   }
 
-  /** Geometry of a layout. A set that was overtaken is dropped. */
+  /** Takes the geometry of a layout; drops it if there is a newer layout. */
   async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
-    const scene = await LitScene.load(glb, set, this.uniforms, this.anisotropy);
+    const anisotropy = Math.min(MOST_ANISOTROPY, this.renderer.capabilities.getMaxAnisotropy());
+    const scene = await LitScene.load(glb, set, this.uniforms, anisotropy);
     let taken = false;
     try {
       if (!this.layouts.awaits(set)) return;
-      scene.applyDocument(this.document);
-      await this.compile(scene);
+      this.layouts.bringUpToDate(scene);
+      await this.programs.compile(scene);
       if (!this.layouts.awaits(set)) return;
-      // Other materials lose the programs that the shown scene has, unless they have them while it is there.
-      if (this.shown?.showsWhole) this.wholePrograms.make(scene);
-      scene.applyDocument(this.document); // it may have been edited meanwhile
+      // The new materials share the shown scene's programs only if they take them while that scene exists.
+      if (this.shown?.showsWhole) this.programs.makeWhole(scene);
+      this.layouts.bringUpToDate(scene); // after edits that came meanwhile
       this.layouts.stage(scene, set);
       taken = true;
       this.invalidate();
@@ -167,51 +174,31 @@ export class Viewer {
     }
   }
 
-  /** Has the driver make the scene's programs while the page goes on, where it can: drawing waits for them. */
-  private async compile(scene: LitScene): Promise<void> {
-    if (!this.renderer.extensions.has('KHR_parallel_shader_compile')) return;
-    const timeUp = new Promise((resolve) => setTimeout(resolve, MOST_COMPILING_MS));
-    await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
-  }
-
-  /** True: another view was chosen, and its programs are being made. */
-  private recompile(): boolean {
-    if (!this.shown?.specialise()) return false;
-    this.compiling = true;
-    void this.compile(this.shown).finally(() => {
-      this.compiling = false;
-      this.wanted = true;
-    });
-    return true;
-  }
-
-  /** The solve does not go on: where nothing has shone there is no light. */
+  /** The solve is over: a black surface is dark, and no longer waits for light. */
   settleLight(): void {
     if (this.set?.lit !== false) return;
     this.set.settle();
     this.invalidate();
   }
 
-  /** Nothing to show any more (the server has no scene). */
+  /** The server has no scene. */
   clear(): void {
     this.layouts.dropStaged();
     this.replaceShown(undefined);
     this.setDataQuantity(undefined);
   }
 
-  /** Of the settings of the solve. */
+  /** The sky of the solve's settings. */
   setSky(sky: Sky | undefined): void {
     this.background.ofSettings = sky;
     this.invalidate();
   }
 
   applyDocument(document: Gltf, pointers: string[]): void {
-    this.document = document;
     this.background.ofScene = skyOf(document);
-    this.shown?.applyPointers(document, pointers);
-    this.layouts.stagedScene?.applyPointers(document, pointers);
+    this.layouts.applyDocument(document, pointers);
     this.gizmo.refresh();
-    // The document of a scene that has just come is no edit: its first light may be sharp.
+    // A scene without light has just come; its document is no edit, and its first light may be sharp.
     if (this.shown?.set.showsLight) {
       this.pace.hurry(performance.now(), EDIT_HURRY_MS);
       this.pace.awaitLight(performance.now());
@@ -219,7 +206,7 @@ export class Viewer {
     this.invalidate();
   }
 
-  /** Pages for a quantity beside irradiance, or none. */
+  /** Makes pages for a quantity besides irradiance; undefined: for none. */
   setDataQuantity(quantity: string | undefined): void {
     this.layouts.setDataQuantity(quantity);
     this.invalidate();
@@ -248,12 +235,7 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
-  /** The graphics card was taken away. */
-  get isLost(): boolean {
-    return this.lost;
-  }
-
-  /** Where others look from is drawn into the picture. */
+  /** Draws where others look from into the picture. */
   showPeople(people: People): void {
     this.people = people;
     this.world.add(people.root);
@@ -264,7 +246,7 @@ export class Viewer {
     this.moved();
   }
 
-  /** What there is to look at of a node: its surfaces, or the room around a lamp that has none. Metres. */
+  /** The box to frame for a node, in metres: around its surfaces, or the surroundings of a lamp without surfaces. */
   boxOf(node: number): Box3 | undefined {
     const object = this.objectOf(node);
     const box = object && surfaceBox(object);
@@ -275,7 +257,7 @@ export class Viewer {
       : undefined;
   }
 
-  /** PNG of what is on the screen. */
+  /** PNG of the picture, without signs. */
   async picture(): Promise<Blob> {
     await this.settle();
     this.withoutSigns(() => this.draw(1));
@@ -287,7 +269,7 @@ export class Viewer {
     );
   }
 
-  /** A lamp that came with an edit has a marker before it has a node in the geometry. */
+  /** A new lamp has a marker before the geometry has its node. */
   private objectOf(node: number): Object3D | undefined {
     return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node);
   }
@@ -310,12 +292,12 @@ export class Viewer {
     this.promote(now);
     if (this.rig.update(seconds)) this.moved();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE, this.rig.camera.position)) this.wanted = true;
-    this.wholePrograms.turn(this.shown, !this.compiling && this.pace.isAtRest(now));
-    if (this.compiling || this.recompile()) return; // the last picture stays
-    this.brightness.turn(now, this.replaced);
+    this.programs.turn(this.shown, this.pace.isAtRest(now));
+    if (this.programs.recompile(this.shown, () => (this.wanted = true))) return; // the last picture stays
+    this.brightness.turn(now);
     if (this.exposure.step(seconds)) this.wanted = true;
     const streamed = this.dataSet ?? this.shown?.set;
-    if (streamed?.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
+    if (streamed?.complete === false) this.pace.hurry(now, 0); // the first light comes soon first, and sharp later
     if ((!this.wanted && !this.pace.isSharpDue(now)) || this.brightness.standsStill(now)) return;
     if (this.exposure.wantsQuiet) return;
     const scale = this.pace.ask(now);
@@ -327,11 +309,11 @@ export class Viewer {
     this.events.drawn();
   }
 
-  /** `scale`: of each side, to draw fewer pixels than the screen has. */
+  /** `scale`: of each side; below 1, fewer pixels are drawn than the screen has. */
   private draw(scale: number): void {
     this.scale = scale;
     if (!this.brightness.holdsLightBack(performance.now())) this.shown?.set.showLight();
-    this.shown?.specialise(); // where the picture cannot wait
+    this.shown?.specialise(); // for pictures that cannot wait for recompile()
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
@@ -361,7 +343,7 @@ export class Viewer {
     });
   }
 
-  /** Handles, lamps' signs and other viewers are no part of the scene's light. */
+  /** Draws without handles, lamp signs and other viewers, which are no part of the scene's light. */
   private withoutSigns<T>(draw: () => T): T {
     this.setSigns(false);
     const drawn = draw();
@@ -375,9 +357,9 @@ export class Viewer {
     if (this.people) this.people.root.visible = visible;
   }
 
-  /** Ends when the picture has the exposure that the light there is now asks for. */
+  /** Ends when the picture has the exposure for the light that is there now. */
   async settle(): Promise<void> {
-    while (this.shown && this.set?.waiting) await new Promise((resolve) => setTimeout(resolve, 20));
+    while (this.shown && this.set?.waiting) await pause(LOOK_MS);
     this.shown?.specialise();
     await this.brightness.settle();
     this.shown?.set.showLight();
@@ -385,7 +367,7 @@ export class Viewer {
   }
 
   private promote(now: number): void {
-    if (this.gizmo.dragging) return; // what is held is not taken out of the hand
+    if (this.gizmo.dragging) return; // the user holds an object of the shown scene
     const scene = this.layouts.takeReady(now);
     if (!scene) return;
     this.replaceShown(scene);
@@ -395,7 +377,7 @@ export class Viewer {
 
   private replaceShown(scene: LitScene | undefined): void {
     const before = this.shown;
-    this.replaced = before?.set.lit === true;
+    this.brightness.replacesLight = before?.set.lit === true;
     this.layouts.shown = scene;
     if (before) {
       this.gizmo.attach(undefined);
@@ -406,7 +388,7 @@ export class Viewer {
       this.world.add(scene.root);
       this.rig.setBounds(scene.bounds);
     }
-    this.pagesView.show(this.mode?.flat ? scene?.set : undefined); // it keeps no pages that are gone
+    this.pagesView.show(this.mode?.flat ? scene?.set : undefined); // the old pages are gone
     this.invalidate();
   }
 
@@ -416,7 +398,7 @@ export class Viewer {
     this.screen.resize(width, height, Math.min(devicePixelRatio, 2));
     this.rig.resize(width / height);
     this.pagesView.resize(width / height);
-    if (this.shown) this.draw(this.scale); // resizing clears the canvas: drawn at once, it does not blink
+    if (this.shown) this.draw(this.scale); // resizing clears the canvas, which would blink
     this.invalidate();
   }
 
@@ -425,7 +407,7 @@ export class Viewer {
     this.pace.forget();
     this.fences.forget();
     this.screen.forget();
-    this.wholePrograms.forget();
+    this.programs.forget();
     this.exposure.forgetCard();
     const { sets, stagedScene } = this.layouts;
     if (lost) {
@@ -439,10 +421,10 @@ export class Viewer {
   }
 }
 
-/** What the browser says of the card, where it says anything. */
+/** Whether the browser draws in software, as far as it tells. */
 function drawsWithoutCard(gl: WebGL2RenderingContext): boolean {
   let name = String(gl.getParameter(gl.RENDERER));
-  // Only browsers that hide the name there are asked for it in the old way, which others warn of.
+  // Only browsers that hide the name need the extension; others warn of its use.
   const extension = name === 'WebKit WebGL' ? gl.getExtension('WEBGL_debug_renderer_info') : null;
   if (extension) name = String(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL));
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);

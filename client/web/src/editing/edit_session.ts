@@ -1,0 +1,226 @@
+// Selecting and changing objects: the scene's document, its panel, and the gizmo.
+
+import type { Object3D } from 'three';
+import * as edits from '../document/edits';
+import { type Gltf, handlesOf, hangingNodes, isSameScene, lightOf, nodeName } from '../document/gltf';
+import { SceneDocument, type SendEdit } from '../document/scene_document';
+import type { Patch, ScenePatchedNote } from '../protocol/messages';
+import { type PageName, shownName } from '../protocol/page_name';
+import type { Frame } from '../ui/frame';
+import { ScenePanel, type Selection } from '../ui/scene_panel';
+import type { GizmoMode } from '../view/controls/gizmo';
+import type { Viewer } from '../view/viewer';
+import { lampAhead, placementOf, written } from './placement';
+
+const HANDLES: readonly GizmoMode[] = ['translate', 'rotate', 'scale'];
+const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
+
+export interface EditHost {
+  name: Pick<PageName, 'isMine'>;
+  picture: Pick<Viewer, 'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'invalidate'>;
+  frame: Pick<Frame, 'toasts' | 'setGizmo' | 'showTab' | 'panelOpen'>;
+  send: SendEdit;
+  /** The steps of undo are others, or `document.lastEdit` is another. */
+  historyChanged(): void;
+  frameSelection(): void;
+  loadFile(file: File): void;
+  notAccepted(text: string, wanted: string): void;
+}
+
+export class EditSession {
+  readonly panel: ScenePanel;
+  readonly document: SceneDocument;
+  selection: Selection | undefined;
+  /** The handles that the user has chosen. */
+  private wanted: GizmoMode = 'translate';
+  /** The document as it came last. */
+  private known: Gltf | undefined;
+  /** The object that is being dragged, and where it was before. */
+  private dragged: { node: number; before: edits.Placement } | undefined;
+
+  constructor(private readonly host: EditHost) {
+    this.document = new SceneDocument((by) => host.name.isMine(by), host.send, {
+      changed: (pointers) => this.onChanged(pointers),
+      refused: (label, reason) => host.frame.toasts.show(`${label}: ${reason}`, 'bad'),
+      historyChanged: () => host.historyChanged(),
+    });
+    this.panel = this.makePanel();
+  }
+
+  private makePanel(): ScenePanel {
+    const { host } = this;
+    return new ScenePanel({
+      select: (selection) => this.select(selection),
+      setColour: (material, rgb) =>
+        this.make('Colour', edits.setColour(material, this.document.gltf, rgb), `colour ${material}`),
+      setEmission: (material, rgb, strength) =>
+        this.make('Emission', edits.setEmission(material, rgb, strength), `emission ${material}`),
+      setLight: (light, change) =>
+        this.make('Light', edits.setLight(light, change), `light ${light} ${Object.keys(change).join()}`),
+      setPlacement: (node, placement) => this.make('Placement', edits.setPlacement(node, placement)),
+      setVisible: (node, visible) =>
+        this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),
+      remove: (node) => this.remove(node),
+      addLamp: () => void this.addLamp(),
+      frameSelection: () => host.frameSelection(),
+      endGesture: () => this.document.endGesture(),
+      loadFile: (file) => host.loadFile(file),
+      notAccepted: (text, wanted) => host.notAccepted(text, wanted),
+    });
+  }
+
+  start(): void {
+    this.panel.setSelection(undefined);
+  }
+
+  onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
+    if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
+    if (!this.host.name.isMine(note.by))
+      this.host.frame.toasts.showOnce(
+        `${shownName(note.by) || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`,
+      );
+  }
+
+  /** The picture has new objects. The one that was selected may be among them. */
+  onSceneShown(): void {
+    this.host.picture.applyDocument(this.document.gltf, []);
+    this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
+    this.host.picture.select(this.selection?.node);
+  }
+
+  // ---- selection ----
+
+  select(selection: Selection | undefined): void {
+    this.selection = selection;
+    this.host.picture.select(this.isPictureOld ? undefined : selection?.node);
+    this.offerHandles();
+    this.panel.setSelection(selection);
+    if (selection && this.host.frame.panelOpen) this.host.frame.showTab('Scene');
+  }
+
+  /** The document is of another scene than the picture, so the numbers of nodes mean different objects in the two. */
+  private get isPictureOld(): boolean {
+    const { shown } = this.host.picture;
+    return shown !== undefined && this.known?.nodes !== undefined && !isSameScene(shown.source, this.known);
+  }
+
+  selectHit(object: Object3D | undefined): void {
+    const scene = this.host.picture.shown;
+    const node = object && !this.isPictureOld ? scene?.nodeOf(object) : undefined;
+    this.select(node === undefined ? undefined : { node, material: object && scene?.materialIndexOf(object) });
+  }
+
+  /** For users without a pointer. */
+  selectNext(step: number): void {
+    const { gltf } = this.document;
+    const nodes = hangingNodes(gltf)
+      .map(({ node }) => node)
+      .filter((node) => gltf.nodes?.[node]?.mesh !== undefined || lightOf(gltf, node));
+    if (nodes.length === 0) return;
+    const at = this.selection ? nodes.indexOf(this.selection.node) : -1;
+    const node = nodes[at < 0 ? (step > 0 ? 0 : nodes.length - 1) : (at + step + nodes.length) % nodes.length]!;
+    this.select({ node, material: this.materialsOf(node)[0] });
+  }
+
+  private materialsOf(node: number): number[] {
+    const mesh = this.document.gltf.nodes?.[node]?.mesh;
+    const primitives = mesh === undefined ? [] : (this.document.gltf.meshes?.[mesh]?.primitives ?? []);
+    return [...new Set(primitives.flatMap((primitive) => primitive.material ?? []))];
+  }
+
+  // ---- changes ----
+
+  private make(label: string, patch: Patch, key?: string): void {
+    this.document.edit(label, patch, key).catch(() => undefined); // the refusal was shown
+  }
+
+  setGizmo(mode: GizmoMode): void {
+    const { picture } = this.host;
+    if (picture.gizmo.dragging) return; // the user has to let go of one kind of handle before taking another
+    this.wanted = mode;
+    this.offerHandles();
+    picture.invalidate();
+  }
+
+  /** Offers the handles that change something about the selected object, and takes the user's choice if it is one. */
+  private offerHandles(): void {
+    const { gizmo } = this.host.picture;
+    const node = this.selection?.node;
+    const offered = node === undefined ? HANDLES : handlesOf(this.document.gltf, node);
+    const mode = offered.includes(this.wanted) ? this.wanted : offered[0]!;
+    if (mode !== gizmo.mode && !gizmo.dragging) gizmo.setMode(mode);
+    this.host.frame.setGizmo(mode, offered);
+  }
+
+  onGizmoDragging(active: boolean): void {
+    const node = active ? this.selection?.node : undefined;
+    const { translation, rotation, scale } = (node === undefined ? undefined : this.document.gltf.nodes?.[node]) ?? {};
+    this.dragged = node === undefined ? undefined : { node, before: { translation, rotation, scale } };
+    if (!active) this.document.endGesture();
+  }
+
+  /** Puts the dragged object back to where it was, here and on the server. False: no object is being dragged. */
+  cancelDrag(): boolean {
+    const { gizmo } = this.host.picture;
+    if (!gizmo.cancel()) return false;
+    if (!this.dragged) return true;
+    const { node, before } = this.dragged;
+    const patch = edits.setPlacement(node, written(gizmo.mode, before));
+    const { label, key } = this.dragOf(node, gizmo.mode);
+    this.document.cancelGesture(label, key, patch).catch(() => undefined); // the refusal was shown
+    return true;
+  }
+
+  onGizmoChanged(object: Object3D, mode: GizmoMode): void {
+    const node = this.selection?.node;
+    if (node === undefined) return;
+    const { label, key } = this.dragOf(node, mode);
+    this.make(label, edits.setPlacement(node, written(mode, placementOf(object))), key);
+  }
+
+  private dragOf(node: number, mode: GizmoMode): { label: string; key: string } {
+    return { label: `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`, key: `${mode} ${node}` };
+  }
+
+  async addLamp(): Promise<void> {
+    const { rig, exposure, shown } = this.host.picture;
+    if (!shown) return;
+    const { place, candela } = lampAhead(rig.camera, rig.target, shown.bounds, exposure.ofLeaving);
+    const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
+    try {
+      await this.document.edit('Add lamp', patch);
+      this.select({ node, material: undefined });
+    } catch {
+      // The refusal was shown.
+    }
+  }
+
+  removeSelected(): void {
+    if (this.selection) this.remove(this.selection.node);
+  }
+
+  private remove(node: number): void {
+    const patch = edits.detachNode(this.document.gltf, node);
+    if (!patch) return;
+    this.select(undefined);
+    this.make(`Remove ${nodeName(this.document.gltf, node)}`, patch);
+  }
+
+  private onChanged(pointers: string[]): void {
+    const { gltf } = this.document;
+    this.host.picture.applyDocument(gltf, pointers);
+    if (pointers.length === 0) {
+      // The document may come after the picture: an object that was clicked meanwhile stays selected, unless the server
+      // has come back with another scene, in which its number means another object.
+      const isKept = this.known?.nodes === undefined || isSameScene(this.known, gltf);
+      this.known = gltf;
+      this.select(isKept && this.selection && gltf.nodes?.[this.selection.node] ? this.selection : undefined);
+      this.panel.setDocument(gltf, (node) => this.materialsOf(node));
+    } else {
+      const hangs = hangingNodes(gltf).some(({ node }) => node === this.selection?.node);
+      if (this.selection && !hangs) this.select(undefined); // somebody has removed the object
+      this.offerHandles(); // the edit may have changed the kind of a lamp
+      this.panel.refresh();
+    }
+  }
+}
