@@ -9,7 +9,7 @@
 #include "server/scene/document/document.h"
 #include "server/scene/shading/shade.h"
 #include "server/scene/values/patch_scene.h"
-#include "server/solver/shooting/shooting_solver.h"
+#include "server/solver/pipeline/make_solver.h"
 
 namespace radiosity {
 namespace {
@@ -33,14 +33,14 @@ Solved solveCornell(bool paper) {
   EXPECT_TRUE((*transport)->setScene(patches));
   solver::SolverSettings settings;
   settings.method = paper ? Method::kPaper : Method::kShooting;
-  solver::ShootingSolver solver(patches, scene::shadePatches(*imported, *patches), **transport, settings);
-  for (int i = 0; i < 2000; ++i) {
-    const auto outcome = solver.step();
+  const auto solver = solver::makeSolver(patches, scene::shadePatches(*imported, *patches), **transport, settings);
+  for (int i = 0; i < 20'000; ++i) {
+    const auto outcome = solver->step();
     EXPECT_TRUE(outcome.has_value()) << outcome.error().text();
     if (!outcome || *outcome == solver::StepOutcome::kConverged) break;
   }
   Solved solved;
-  const auto light = solver.irradiance();
+  const auto light = solver->irradiance();
   for (const auto& surface : patches->surfaces) {
     double flux = 0.0;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
@@ -51,7 +51,7 @@ Solved solveCornell(bool paper) {
     solved.surface_flux.push_back(flux);
     solved.total += flux;
   }
-  solved.scatter_shots = solver.transportCounters().scatter_shots;
+  solved.scatter_shots = solver->transportCounters().scatter_shots;
   return solved;
 }
 

@@ -388,12 +388,18 @@ std::vector<std::string> LitScene::warnings(std::size_t most) const {
   if (hasNoLamp() && first.size() < most) {
     first.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
   }
+  if (settings_.method == Method::kPaper && first.size() < most) {
+    first.emplace_back(
+        "method paper: the stated error is that of light which is still unshot; the method does not know what its "
+        "samples are off by");
+  }
   return first;
 }
 
 std::size_t LitScene::warningCount() const {
   return light_report_.dark().size() + light_report_.lost().size() + scene_->warnings.size() +
-         patches_->warnings.size() + materials_.warnings.size() + (hasNoLamp() ? 1 : 0);
+         patches_->warnings.size() + materials_.warnings.size() + (hasNoLamp() ? 1 : 0) +
+         (settings_.method == Method::kPaper ? 1 : 0);
 }
 
 /// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
