@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/gpu/draw/hemicube_renderer.h"
+#include "server/solver/patches/side.h"
 #include "tests/benchmark/built_scenes.h"
 #include "tests/benchmark/whole_solve.h"
 #include "tests/gl/scene_builder.h"

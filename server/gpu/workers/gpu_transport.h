@@ -33,7 +33,7 @@ struct WorkerOptions {
   Sight sight = Sight::kAuto;
   std::size_t hands = 0;  ///< of each worker (ShotCrew); 0: as many as suit the driver
   /// On which Sight is tried; none: it is not.
-  std::function<Result<std::shared_ptr<const scene::PatchScene>>()> make_trial_room;
+  std::function<Result<std::shared_ptr<const scene::PatchScene>>()> make_trial_room = {};
 };
 
 /// Worker processes, each with its own EGL display, results in shared memory. A worker that dies or hangs is replaced

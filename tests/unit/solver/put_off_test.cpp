@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "server/solver/pipeline/make_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 

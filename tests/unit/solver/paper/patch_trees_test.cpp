@@ -8,7 +8,10 @@ namespace radiosity::solver {
 namespace {
 
 using test::makeQuadScene;
-using test::unitQuad;
+
+test::Quad unitQuad(std::uint32_t width, std::uint32_t height) {
+  return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, width, height, glm::vec3(1.0F), glm::vec3(0.5F)};
+}
 
 FluxAccumulators nothing(const PatchTrees& trees) {
   FluxAccumulators flux;
