@@ -11,7 +11,7 @@ namespace radiosity {
 enum class Method : std::uint8_t {
   kGather,    ///< lamps shoot, texels gather the reflected light along rays (the default)
   kShooting,  ///< progressive shooting in rounds, until the stated error is reached; remembers no links
-  kPaper,     ///< Lum, Ma and Max 2002: one round of progressive shooting through mipmapped hemicubes
+  kPaper,     ///< Lum, Ma and Max 2002: progressive shooting through hemicubes of mipmapped patch IDs
 };
 
 inline constexpr std::array<std::string_view, 3> kMethodNames{"gather", "shooting", "paper"};

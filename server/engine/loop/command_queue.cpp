@@ -21,13 +21,14 @@ bool CommandQueue::push(Command command, Kind kind) {
 std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait,
                                                                      std::optional<std::chrono::nanoseconds> longest) {
   std::unique_lock lock(mutex_);
-  const auto has_some = [this] { return closed_ || !prompt_.empty() || !long_.empty(); };
+  const auto has_some = [this] { return closed_ || woken_ || !prompt_.empty() || !long_.empty(); };
   if (wait && longest) {
     (void)wake_.wait_for(lock, *longest, has_some);
   } else if (wait) {
     wake_.wait(lock, has_some);
   }
   if (closed_) return std::nullopt;
+  woken_ = false;
   const bool is_overdue = gave_prompt_ && !long_.empty() && Clock::now() - long_.front().since >= patience_;
   gave_prompt_ = !prompt_.empty() && !is_overdue;
   if (gave_prompt_ || long_.empty()) return std::exchange(prompt_, {});
@@ -35,6 +36,14 @@ std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait,
   one.push_back(std::move(long_.front().command));
   long_.pop_front();
   return one;
+}
+
+void CommandQueue::wake() {
+  {
+    const std::scoped_lock lock(mutex_);
+    woken_ = true;
+  }
+  wake_.notify_one();
 }
 
 bool CommandQueue::closed() const {

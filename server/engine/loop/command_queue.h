@@ -26,6 +26,8 @@ class CommandQueue {
   /// False: the queue is full or closed, and the command will never run.
   enum class Kind { kPrompt, kLong };
   [[nodiscard]] bool push(Command command, Kind kind = Kind::kPrompt);
+  /// take() returns, with nothing more than it would have had. Nobody waits for it: it is not pressing.
+  void wake();
 
   /// All prompt ones that are due, oldest first; where there are none, or the last call gave some and the oldest long
   /// one has waited long enough, that. `wait`: sleeps until there is something, or for `longest`. Nothing: the queue
@@ -34,7 +36,7 @@ class CommandQueue {
                                                          std::optional<std::chrono::nanoseconds> longest = {});
 
   [[nodiscard]] bool closed() const;
-  /// Whether take() has prompt ones to give, or the end to tell of. Any thread.
+  /// Whether take() has prompt commands to give, or the end to tell of. Any thread.
   [[nodiscard]] bool isPressing() const;
 
   /// Wakes the solve thread for the last time. Commands that still wait are dropped unanswered.
@@ -53,7 +55,7 @@ class CommandQueue {
   std::condition_variable wake_;
   std::vector<Command> prompt_;
   std::deque<Waiting> long_;
-  bool gave_prompt_ = false, closed_ = false;
+  bool gave_prompt_ = false, woken_ = false, closed_ = false;
 };
 
 }  // namespace radiosity::engine

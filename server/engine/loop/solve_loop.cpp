@@ -230,7 +230,9 @@ Result<solver::StepOutcome> SolveLoop::stepSolver() {
 
 bool SolveLoop::isWantedElsewhere() const {
   if (queue_.isPressing()) return true;
-  if (!settings_.time_limit_s || state_ != SolveState::kSolving || first_light_) return false;
+  // Without any light there would be nothing to end with.
+  if (!settings_.time_limit_s || state_ != SolveState::kSolving || first_light_ || lit_->solver().shots() == 0)
+    return false;
   const double seconds = seconds_ + std::chrono::duration<double>(Clock::now() - step_began_).count();
   return seconds >= *settings_.time_limit_s + kLimitGrace;
 }

@@ -65,13 +65,7 @@ void SolveLoop::beginLoad(LoadJob::Request request) {
   };
   if (called_off_) return refuse(cancelled("the server is shutting down"));
   const LoadJob::Options options{settings_, options_.first_light_above, lit_ ? 0 : options_.first_texels, limits_};
-  const auto wake = [this] {
-    try {
-      (void)queue_.push([] {});  // a thread whose queue is full is awake
-    } catch (const std::bad_alloc&) {
-      log::warn("out of memory: the solve thread will see later what a load has made");
-    }
-  };
+  const auto wake = [this] { queue_.wake(); };
   try {
     load_ = std::make_unique<LoadJob>(std::move(request), options, *transport_, wake, std::move(former_load_));
   } catch (const std::system_error& error) {
@@ -110,7 +104,7 @@ void SolveLoop::callOff() {
     const std::scoped_lock lock(mutex_);
     if (load_task_) load_task_->cancel();
   }
-  (void)queue_.push([] {});  // for the solve thread to see it
+  queue_.wake();  // for the solve thread to see it
   long_work_->callOff();
 }
 

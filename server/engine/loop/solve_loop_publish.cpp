@@ -121,7 +121,7 @@ void SolveLoop::welcomeWatchers() {
 
 std::shared_ptr<void> SolveLoop::watch(Quantity quantity) {
   auto watching = watches_.add(quantity);
-  (void)queue_.push([] {});  // wakes the thread; one whose queue is full is awake
+  queue_.wake();
   return watching;
 }
 

@@ -21,6 +21,7 @@
 #include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/workers/prepared_scene.h"
 #include "server/gpu/workers/worker_process.h"
+#include "server/gpu/workers/worker_slot.h"
 #include "server/gpu/workers/worker_start.h"
 
 namespace radiosity::gpu {
@@ -37,8 +38,10 @@ constexpr double kSlowPixelSeconds = 2e-6;
 constexpr int kLeastUse = 5000;
 /// And it is given time so often at most: what waits for a card that hangs may look now and then whether it still does.
 constexpr int kMostExtensions = 30;
-/// A batch that may be put off has so long, and is then asked about every so often.
+/// A batch that may be put off has so long, twice as long after each that brought nothing, and is then asked about
+/// every so often.
 constexpr std::chrono::milliseconds kUndisturbed{100}, kBetweenLooks{10};
+constexpr std::chrono::steady_clock::duration kMostUndisturbed = std::chrono::minutes(2);
 /// A worker takes in a scene at ten times this rate at least.
 constexpr double kSlowSceneBytesPerSecond = 5e6;
 
@@ -47,20 +50,6 @@ using Clock = std::chrono::steady_clock;
 Clock::duration seconds(double value) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(value));
 }
-
-/// A process and what it has of the current batch.
-struct Slot {
-  std::optional<WorkerProcess> process;  ///< none: died, to be replaced
-  bool takes_scene = false;              ///< it was sent one, and has not said that it has it
-  std::deque<std::size_t> held;          ///< chunks sent, not yet reported
-  std::vector<std::size_t> done;         ///< chunks reported, still only in its accumulators
-  Clock::time_point deadline;            ///< of the chunk it has held longest
-  Clock::duration patience{};            ///< that the chunk may take
-  Clock::duration used_before{};         ///< processor time of the worker when it started on that chunk, ...
-  Clock::duration used_lately{};         ///< ... and when it was last given time
-  int extensions = 0;                    ///< how often it was
-  solver::TransportCounters counters;
-};
 
 class WorkerTransport final : public solver::Transport {
  public:
@@ -232,6 +221,9 @@ class WorkerTransport final : public solver::Transport {
     auto done = work(batch);
     if (!done) killAll();                         // what the workers have of this batch is void; so are they
     for (auto& slot : slots_) slot.done.clear();  // who dies from here on takes nothing of it into the grave
+    // Whoever asks over and over must not keep a long shot from ever being done.
+    const bool is_in_vain = lacks_ && (take_ == nullptr || next_taken_ == 0);
+    undisturbed_ = is_in_vain ? std::min(2 * undisturbed_, kMostUndisturbed) : Clock::duration(kUndisturbed);
     if (!done || !lacks_) return done;
     for (auto& slot : slots_) {
       if (slot.process) slot.process->sink().clear();
@@ -271,7 +263,7 @@ class WorkerTransport final : public solver::Transport {
   }
 
   Result<void> work(const solver::ShotBatch& batch) {
-    for (const auto undisturbed = Clock::now() + kUndisturbed; !finished();) {
+    for (const auto undisturbed = Clock::now() + undisturbed_; !finished();) {
       if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
       if (auto replaced = replaceDead(); !replaced) return replaced;
       for (auto& slot : slots_) feed(slot, batch);
@@ -465,6 +457,7 @@ class WorkerTransport final : public solver::Transport {
   std::size_t gather_shots_ = 0;  ///< of the batch
   std::function<bool()> is_wanted_;
   std::uint64_t batch_ = 0;
+  Clock::duration undisturbed_ = kUndisturbed;            ///< kUndisturbed, or longer
   bool put_off_ = false, lacks_ = false;                  ///< this batch; and some of it was not done
   const TakeLinks* take_ = nullptr;                       ///< where links are wanted
   std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before

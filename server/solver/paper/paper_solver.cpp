@@ -14,6 +14,8 @@ constexpr std::uint32_t kKind = 0x31504150U;  // "PAP1": what a checkpoint holds
 
 /// "We used a LOD bias of one, with filtering by a 3 by 3 Gaussian filter" (section 5).
 constexpr float kLevelBias = 1.0F;
+/// Residual before the first light: above all that may be asked for.
+constexpr double kNothingArrived = 2.0;
 /// Pixels of a hemicube's top face: of the weakest shots and of the strongest. The paper names none.
 constexpr std::uint32_t kLeastResolution = 32, kMostResolution = 256;
 
@@ -54,6 +56,7 @@ void PaperSolver::startAnew() {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       emitted_ +=
           static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dvec3(trees_.emission(side, leaf));
+  shown_.reset();
   received_ = reflected_ = 0.0;
   share_ = (channels(emitted_) + punctual_.owed(1)) / static_cast<double>(settings_.planner.shooters_a_round);
   shot_level_.assign(patches_->nodeCount(), kNeverShot);
@@ -74,7 +77,20 @@ Result<StepOutcome> PaperSolver::step() {
   }
   if (auto carried = carry(batch); !carried) return tl::unexpected(carried.error());
   settleError();
+  if (isDone()) {  // by what polygons are taken to reflect in the mean, which may be too little
+    trees_.pushPullAll();
+    shown_.reset();
+    settleError();
+  }
   return isDone() ? StepOutcome::kConverged : StepOutcome::kShot;
+}
+
+const PatchTrees& PaperSolver::shown() const {
+  if (!shown_) {
+    shown_ = trees_;
+    shown_->pushPullAll();
+  }
+  return *shown_;
 }
 
 /// Section 4.2, steps 1 and 2: the polygon with most unshot power is pushed and pulled, and its quadtree walked down.
@@ -152,6 +168,7 @@ std::optional<ScatterShot> PaperSolver::shotFrom(const NodePlace& node) {
 
 /// Section 4.1: what the pixels of the hemicube name gets the flux of their delta form factors.
 Result<void> PaperSolver::carry(const ShotBatch& batch) {
+  shown_.reset();
   if (batch.empty()) return {};
   flux_.reset(patches_->nodeCount());
   const auto counters = transport_.run(batch, flux_);
@@ -175,7 +192,7 @@ void PaperSolver::settleError() {
   if (received_ > 0.0) {
     error_.residual = unshot / ((1.0 - rho) * received_);
   } else {
-    error_.residual = unshot > 0.0 ? 1.0 : 0.0;
+    error_.residual = unshot > 0.0 ? kNothingArrived : 0.0;
   }
   error_.sampling = error_.variation = error_.discretization = 0.0;
   error_.total = error_.residual;
@@ -194,34 +211,34 @@ void PaperSolver::setLights(const LightSources& sources) {
 void PaperSolver::setTargetError(double target) { settings_.target_error = target; }
 
 std::vector<glm::vec3> PaperSolver::irradiance() const {
-  trees_.pushPullAll();
+  const auto& trees = shown();
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
-  for (const auto& side : trees_.sides())
+  for (const auto& side : trees.sides())
     for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node)
-      values[node] = glm::vec3(trees_.irradiance(node));
+      values[node] = glm::vec3(trees.irradiance(node));
   return values;
 }
 
 std::vector<glm::vec3> PaperSolver::unshot() const {
-  trees_.pushPullAll();
+  const auto& trees = shown();
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
-  for (const auto& side : trees_.sides())
+  for (const auto& side : trees.sides())
     for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node)
-      values[node] = glm::vec3(trees_.unshot(node));
+      values[node] = glm::vec3(trees.unshot(node));
   return values;
 }
 
 EnergyParts PaperSolver::energy() const {
-  trees_.pushPullAll();
+  const auto& trees = shown();
   glm::dvec3 absorbed(0.0), unshot(0.0);
-  for (const auto& side : trees_.sides())
+  for (const auto& side : trees.sides())
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto node = side.first_node + leaf;
       const auto area = static_cast<double>(patches_->node_area[node]);
-      absorbed += area * (1.0 - glm::dvec3(trees_.reflectance(side, leaf))) * trees_.irradiance(node);
-      unshot += area * trees_.unshot(node);
+      absorbed += area * (1.0 - glm::dvec3(trees.reflectance(side, leaf))) * trees.irradiance(node);
+      unshot += area * trees.unshot(node);
     }
-  const auto escaped = trees_.escaped(), backface = trees_.backface();
+  const auto escaped = trees.escaped(), backface = trees.backface();
   EnergyParts parts;
   for (int c = 0; c < 3; ++c) {
     const auto i = static_cast<std::size_t>(c);

@@ -21,7 +21,7 @@ class PaperSolver final : public Solver {
   PaperSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
               Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
 
-  /// One shot.
+  /// One shot. After an error what it took is lost: the caller makes a new solver.
   [[nodiscard]] Result<StepOutcome> step() override;
   /// "Recalculation of the entire radiosity solution from scratch" (section 1).
   void setMaterials(const scene::PatchMaterials& materials) override;
@@ -55,6 +55,7 @@ class PaperSolver final : public Solver {
   [[nodiscard]] std::uint32_t resolutionFor(double power) const;
   [[nodiscard]] Result<void> carry(const ShotBatch& batch);
   void settleError();
+  [[nodiscard]] const PatchTrees& shown() const;
   [[nodiscard]] bool isDone() const { return error_.residual <= settings_.target_error; }
 
   std::shared_ptr<const scene::PatchScene> patches_;
@@ -63,8 +64,11 @@ class PaperSolver final : public Solver {
   SolverSettings settings_;
   LightSources sources_;
   PunctualLights punctual_;
-  mutable PatchTrees trees_;  ///< what is put off is done where it is asked for
-  FluxAccumulators flux_;     ///< of one shot
+  PatchTrees trees_;
+  /// The same with nothing put off, for those who look, so that no look changes which patch shoots next; until the next
+  /// shot.
+  mutable std::optional<PatchTrees> shown_;
+  FluxAccumulators flux_;  ///< of one shot
   glm::dvec3 emitted_{0.0};
   double received_ = 0.0, reflected_ = 0.0;  ///< by all shots so far, all channels
   double share_ = 0.0;                       ///< power of a shot, about

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
 #include <utility>
 
 namespace radiosity::solver {
@@ -19,9 +18,6 @@ void add(Flux3& sum, const Flux3& flux) {
 glm::dvec3 scaled(const Flux3& flux, double scale) {
   return glm::dvec3(static_cast<double>(flux[0]), static_cast<double>(flux[1]), static_cast<double>(flux[2])) / scale;
 }
-
-/// 1 2 1 in each direction, by offset + 1.
-double tent(int x, int y) { return (x == 1 ? 2.0 : 1.0) * (y == 1 ? 2.0 : 1.0); }
 
 }  // namespace
 
@@ -104,33 +100,35 @@ void PatchTrees::pushPullAll() {
   for (std::uint32_t side = 0; side < sides_.size(); ++side) pushPull(side);
 }
 
-/// "A 3 by 3 Gaussian filter" on the unpushed light (section 4.3 and 5), level by level. What goes to neighbours is in
-/// proportion to their area, so that no flux is lost and even light stays even.
+/// "A 3 by 3 Gaussian filter" on the unpushed light (sections 4.3 and 5), level by level. Two neighbours exchange in
+/// proportion to how their light differs, by the weight of the filter and the smaller area: no flux is lost, and even
+/// light stays even up to the rim, where a filter that only normalises its weights would darken or brighten it.
 void PatchTrees::smooth(const Side& side) {
-  std::vector<glm::dvec3> smoothed;
+  std::vector<glm::dvec3> change;
   for (std::uint32_t level = 0; level < side.level_count; ++level) {
     const auto grid = scene::levelGrid(side.width, side.height, level);
     const auto first = side.first_node + grid.offset;
-    const auto width = static_cast<int>(grid.width), height = static_cast<int>(grid.height);
-    smoothed.assign(std::size_t{grid.width} * grid.height, glm::dvec3(0.0));
-    const auto weight = [&](int x, int y, int dx, int dy) {
-      const int nx = x + dx - 1, ny = y + dy - 1;
-      if (nx < 0 || ny < 0 || nx >= width || ny >= height) return 0.0;
-      return tent(dx, dy) *
-             static_cast<double>(patches_->node_area[first + static_cast<std::uint32_t>(ny * width + nx)]);
+    change.assign(std::size_t{grid.width} * grid.height, glm::dvec3(0.0));
+    const auto exchange = [&](std::uint32_t a, std::uint32_t b, double weight) {
+      const auto area_a = static_cast<double>(patches_->node_area[first + a]);
+      const auto area_b = static_cast<double>(patches_->node_area[first + b]);
+      if (!(area_a > 0.0 && area_b > 0.0)) return;
+      const auto flux =
+          weight * std::min(area_a, area_b) * (unpushed_[first + a] / area_a - unpushed_[first + b] / area_b);
+      change[a] -= flux;
+      change[b] += flux;
     };
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x) {
-        const auto& flux = unpushed_[first + static_cast<std::uint32_t>(y * width + x)];
-        if (channels(flux) <= 0.0) continue;
-        double sum = 0.0;
-        for (int k = 0; k < 9; ++k) sum += weight(x, y, k % 3, k / 3);
-        for (int k = 0; k < 9; ++k) {
-          const double part = weight(x, y, k % 3, k / 3) / sum;
-          if (part > 0.0) smoothed[static_cast<std::size_t>((y + k / 3 - 1) * width + x + k % 3 - 1)] += part * flux;
-        }
+    constexpr double kBeside = 2.0 / 16.0, kAcross = 1.0 / 16.0;
+    for (std::uint32_t y = 0; y < grid.height; ++y)
+      for (std::uint32_t x = 0; x < grid.width; ++x) {
+        const auto at = y * grid.width + x;
+        const bool has_right = x + 1 < grid.width, has_below = y + 1 < grid.height;
+        if (has_right) exchange(at, at + 1, kBeside);
+        if (has_below) exchange(at, at + grid.width, kBeside);
+        if (has_right && has_below) exchange(at, at + grid.width + 1, kAcross);
+        if (has_right && has_below) exchange(at + 1, at + grid.width, kAcross);
       }
-    std::copy(smoothed.begin(), smoothed.end(), unpushed_.begin() + static_cast<std::ptrdiff_t>(first));
+    for (std::uint32_t i = 0; i < change.size(); ++i) unpushed_[first + i] += change[i];
   }
 }
 

@@ -142,7 +142,7 @@ Result<void> LinkedSolver::measureSlice() {
     for (const auto* want : gathered) order.push_back(*want);
     std::ranges::copy(order, slice.begin());
     measured_ += taken;
-    slice_ = std::max<std::size_t>(taken, 1);
+    slice_ = std::max<std::size_t>(taken, std::max<std::size_t>(fewest_a_slice_, 1));
     return {};
   }
   if (!done) return tl::unexpected<Error>(done.error());

@@ -82,20 +82,15 @@ TEST(PatchTrees, TheGaussianKeepsFluxAndSpreadsIt) {
 
 TEST(PatchTrees, EvenLightStaysEvenUnderTheGaussian) {
   const auto made = makeQuadScene({unitQuad(7, 3)});
+  made.patches->node_area[4] *= 0.3F;
   PatchTrees trees(made.patches, made.materials, 0.0);
   auto shot = nothing(trees);
   const auto& side = trees.sides()[0];
-  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) shot.node[0][leaf] = {quanta(trees, 1.0 / 21.0), 0, 0};
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+    shot.node[0][leaf] = {quanta(trees, static_cast<double>(made.patches->node_area[leaf])), 0, 0};
   trees.receive(shot);
   trees.pushPullAll();
-  // At the rim a leaf gives away as much as it gets but for the corners of the tent: 3 x 3 weights over what is there.
-  double sum = 0.0;
-  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    sum += trees.irradiance(leaf).x / 21.0;
-    EXPECT_NEAR(trees.irradiance(leaf).x, 1.0, 0.4) << leaf;
-  }
-  EXPECT_NEAR(sum, 1.0, 1e-6);
-  EXPECT_NEAR(trees.irradiance(1 * 7 + 3).x, 1.0, 0.2);
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) EXPECT_NEAR(trees.irradiance(leaf).x, 1.0, 1e-6) << leaf;
 }
 
 }  // namespace
