@@ -31,15 +31,25 @@ void Disposer::dispose(std::shared_ptr<const void> of_no_use) noexcept {
   wake_.notify_one();
 }
 
+bool Disposer::drain() {
+  std::unique_lock lock(mutex_);
+  const bool has_some = is_busy_ || !waiting_.empty();
+  idle_.wait(lock, [this] { return !is_busy_ && waiting_.empty(); });
+  return has_some;
+}
+
 void Disposer::run() {
   std::unique_lock lock(mutex_);
   while (true) {
     wake_.wait(lock, [this] { return ends_ || !waiting_.empty(); });
     if (waiting_.empty()) return;
     auto some = std::exchange(waiting_, {});
+    is_busy_ = true;
     lock.unlock();
     some.clear();
     lock.lock();
+    is_busy_ = false;
+    if (waiting_.empty()) idle_.notify_all();
   }
 }
 

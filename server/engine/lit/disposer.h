@@ -29,14 +29,16 @@ class Disposer {
     } catch (const std::bad_alloc&) {  // it goes here
     }
   }
+  /// Waits until all of it is gone, since its memory is needed. False: there was nothing.
+  bool drain();
 
  private:
   void run();
 
   std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable wake_, idle_;
   std::vector<std::shared_ptr<const void>> waiting_;
-  bool ends_ = false;
+  bool ends_ = false, is_busy_ = false;
   std::thread thread_;  ///< begins with the first
 };
 

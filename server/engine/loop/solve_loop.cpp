@@ -157,6 +157,7 @@ void SolveLoop::takeTurn() {
   } catch (const std::bad_alloc&) {
     texels_.forget();
     retired_.reset();
+    if (disposer_.drain()) return log::warn("out of memory: what was of no use any more is gone now");
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;

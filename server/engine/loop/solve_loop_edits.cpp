@@ -69,6 +69,7 @@ std::uint64_t SolveLoop::takeLinks(std::unique_ptr<LitScene> made) {
   log::warn("no memory for the links of the solve before: all is measured anew");
   shots = lit_->solver().shots();
   lit_.reset();  // what it held is needed
+  (void)disposer_.drain();
   if (fitsMemory([&] { (void)made->startSolve(); })) {
     lit_ = std::move(made);
     return shots;

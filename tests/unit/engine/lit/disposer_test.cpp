@@ -35,6 +35,18 @@ TEST(Disposer, destroysOnAThreadOfItsOwnAndAllOfItBeforeItsEnd) {
   EXPECT_EQ(gone_here, 0);
 }
 
+TEST(Disposer, isWaitedForWhereMemoryIsNeeded) {
+  std::atomic<int> gone{0};
+  Disposer disposer;
+  EXPECT_FALSE(disposer.drain());
+  disposer.dispose(std::make_unique<Witness>([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ++gone;
+  }));
+  EXPECT_TRUE(disposer.drain());
+  EXPECT_EQ(gone, 1);
+}
+
 TEST(Disposer, leavesWhatOthersHoldToThem) {
   bool gone = false;
   const auto held = std::make_shared<Witness>([&] { gone = true; });
