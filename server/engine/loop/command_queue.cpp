@@ -28,7 +28,7 @@ std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait,
     wake_.wait(lock, has_some);
   }
   if (closed_) return std::nullopt;
-  woken_ = false;
+  was_woken_ = std::exchange(woken_, false);
   const bool is_overdue = gave_prompt_ && !long_.empty() && Clock::now() - long_.front().since >= patience_;
   gave_prompt_ = !prompt_.empty() && !is_overdue;
   if (gave_prompt_ || long_.empty()) return std::exchange(prompt_, {});

@@ -35,6 +35,9 @@ class CommandQueue {
   [[nodiscard]] std::optional<std::vector<Command>> take(bool wait,
                                                          std::optional<std::chrono::nanoseconds> longest = {});
 
+  /// Whether wake() was called before the last take(), which may have had nothing to give. The solve thread.
+  [[nodiscard]] bool wasWoken() const { return was_woken_; }
+
   [[nodiscard]] bool closed() const;
   /// Whether take() has prompt commands to give, or the end to tell of. Any thread.
   [[nodiscard]] bool isPressing() const;
@@ -56,6 +59,7 @@ class CommandQueue {
   std::vector<Command> prompt_;
   std::deque<Waiting> long_;
   bool gave_prompt_ = false, woken_ = false, closed_ = false;
+  bool was_woken_ = false;  ///< of the solve thread
 };
 
 }  // namespace radiosity::engine

@@ -119,7 +119,7 @@ bool SolveLoop::runCommands() {
     waiting_ = false;
     if (!due) return false;
     lookAfter();
-  } while (due->empty() && !settling_ && hasNothingToDo());
+  } while (due->empty() && !queue_.wasWoken() && !settling_ && hasNothingToDo());
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
     runCommand(command);
