@@ -120,7 +120,7 @@ class Specification(unittest.TestCase):
                 "shared cameras": f"{of['kMaxCameras']}, each told {of['kCameraCallsPerSecond']} times a second",
                 "TLS handshake": f"within 10 s; {of['kMaxTlsHandshakes']} under way at a time"}.items():
             self.assertHas(section("Limits"), f"| {what} | {limit} |")
-        patcher = read("server", "scene", "json_patch.h") + read("server", "scene", "json_patch.cpp")
+        patcher = "".join(read("server", "scene", "document", f"json_patch.{end}") for end in ("h", "cpp"))
         scene = dict(re.findall(r"(kMax\w+) = ([\d']+);", patcher))
         self.assertEqual(int(scene["kMaxPatchOperations"]), of["kMaxPatchOperations"])
         self.assertHas(section("Limits"), f"names in its pointers | {scene['kMaxRead'].replace(chr(39), ',')} |")
