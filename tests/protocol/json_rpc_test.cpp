@@ -139,6 +139,8 @@ TEST(Params, AnErrorNamesThePointerAndTheRange) {
   EXPECT_EQ(paramsError("solve.configure", R"({"targetError":"x"})").pointer, "/params/targetError");
   EXPECT_EQ(paramsError("solve.configure", R"({"targetError":1.5})").pointer, "/params/targetError");
   EXPECT_EQ(paramsError("solve.configure", R"([1])").pointer, "/params");
+  EXPECT_EQ(paramsError("solve.configure", R"({"method":"magic"})").message,
+            "/params/method must be one of gather, shooting, paper");
   EXPECT_EQ(paramsError("hello", "{}").message, "/params/client is missing");
   EXPECT_EQ(paramsError("hello", R"({"client":"x","resume":{"epoch":"e"}})").pointer, "/params/resume/revision");
   EXPECT_EQ(paramsError("hello", R"({"client":"x","codecs":[7]})").pointer, "/params/codecs/0");

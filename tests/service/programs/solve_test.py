@@ -157,6 +157,21 @@ class SolveTest(ServiceCase):
         sides = [p["extras"].get("lightmapSide") for mesh in lit["meshes"] for p in mesh["primitives"] if "extras" in p]
         self.assertIn("back", sides)
 
+    def test_everyMethodLightsTheSceneAndSaysWhichItIs(self):
+        plates.write_glb(self.folder / "plates.glb", plates.lit_document())
+        absorbed = {}
+        for method in ("gather", "shooting", "paper"):
+            self.client("solve", "plates.glb", "-o", "lit.glb", "--report", "r.json", "--method", method,
+                        "--error", "0.05", "--texels", "800")
+            report = json.loads((self.folder / "r.json").read_text())
+            self.assertEqual(report["settings"]["method"], method)
+            self.assertEqual(any("samples are off by" in w for w in report["warnings"]), method == "paper")
+            absorbed[method] = report["energy"]["absorbed"]
+        for method in ("shooting", "paper"):  # a hemicube a patch, and what is still unshot
+            self.assertAlmostEqual(absorbed[method] / absorbed["gather"], 1, delta=0.15)
+        _, errors = self.client("solve", "plates.glb", "-o", "lit.glb", "--method", "magic", expect=2)
+        self.assertIn("--method", errors)
+
     def test_memoryForLinksThatIsNoSizeIsRefused(self):
         _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--link-memory", "much", expect=2)
         self.assertIn("--link-memory", errors)

@@ -197,6 +197,7 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
     settings.time_limit_s = 3.5;
     settings.sky = engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}};
     settings.double_sided = true;
+    settings.method = Method::kShooting;
   }));
   named_ = {};
   restart();
@@ -207,12 +208,14 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
   EXPECT_EQ(settings.time_limit_s, 3.5);
   EXPECT_EQ(settings.sky, (engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}}));
   EXPECT_TRUE(settings.double_sided);
-  named_ = {"targetError", "seed", "doubleSided"};
+  EXPECT_EQ(settings.method, Method::kShooting);
+  named_ = {"targetError", "seed", "doubleSided", "method"};
   restart();
   EXPECT_EQ(status().settings.target_error, kEasy);
   EXPECT_EQ(status().settings.seed, 1U);
   EXPECT_EQ(status().settings.texels, 123U);
   EXPECT_FALSE(status().settings.double_sided);
+  EXPECT_EQ(status().settings.method, Method::kGather);
 }
 
 TEST_F(Kept, SettingsThatCannotBeLitAreNotKept) {

@@ -72,6 +72,25 @@ TEST(CommandQueue, FullQueueRefusesUntilItIsEmptied) {
   EXPECT_TRUE(queue.push([] {}));
 }
 
+TEST(CommandQueue, AWakeUpEndsASleepAndPressesNobody) {
+  CommandQueue queue(2);
+  std::optional<std::vector<CommandQueue::Command>> due;
+  std::thread sleeper([&] { due = queue.take(true); });
+  queue.wake();
+  sleeper.join();
+  ASSERT_TRUE(due);
+  EXPECT_TRUE(due->empty());
+  EXPECT_TRUE(queue.wasWoken());
+  queue.wake();
+  EXPECT_FALSE(queue.isPressing());
+  ASSERT_TRUE(queue.push([] {}));
+  EXPECT_TRUE(queue.isPressing());
+  EXPECT_EQ(queue.take(false)->size(), 1U);
+  EXPECT_TRUE(queue.wasWoken());
+  EXPECT_TRUE(queue.take(false)->empty());
+  EXPECT_FALSE(queue.wasWoken());
+}
+
 TEST(CommandQueue, ClosingWakesTheSleeperAndRefusesFromThenOn) {
   CommandQueue queue(2);
   bool ended = false;
