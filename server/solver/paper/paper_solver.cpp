@@ -18,7 +18,7 @@ constexpr float kLevelBias = 1.0F;
 /// paper names none, and counts on "more finely subdivided shooting patches" against artifacts (section 4.3). Of the
 /// light of the small room 24 % is off with a 256th and 14 % with a 1024th, which takes two and a half times as long.
 constexpr double kShotsOfAll = 1024.0;
-/// Residual before the first light: above all that may be asked for.
+/// Residual before the first light, and at most: above all that may be asked for.
 constexpr double kNothingArrived = 2.0;
 /// Pixels of a hemicube's top face: of the weakest shots and of the strongest. The paper names none.
 constexpr std::uint32_t kLeastResolution = 32, kMostResolution = 256;
@@ -194,7 +194,7 @@ void PaperSolver::settleError() {
   const double unshot = trees_.totalPower() + punctual_.owed(1);
   const double rho = received_ > 0.0 ? std::clamp(reflected_ / received_, 0.0, 0.999) : 0.0;
   if (received_ > 0.0) {
-    error_.residual = unshot / ((1.0 - rho) * received_);
+    error_.residual = std::min(kNothingArrived, unshot / ((1.0 - rho) * received_));
   } else {
     error_.residual = unshot > 0.0 ? kNothingArrived : 0.0;
   }
