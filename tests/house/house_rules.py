@@ -132,7 +132,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 # Imports, exports and workers of TypeScript; also those of types alone, and those that are spread over several lines.
 IMPORT = re.compile(r"""(?:\b(?:from|import)\s*\(?\s*|\bnew\s+URL\(\s*)(['"])(\.{1,2}/[^'"]+|src/[^'"]+)\1""")
 # Of a class as Prettier writes it.
-CLASS = re.compile(r"^(?:export )?(?:default )?(?:abstract )?class (\w+)[^\n]*\{\n(.*?)^\}", re.M | re.S)
+CLASS = re.compile(r"^(?:export )?(?:default )?(?:abstract )?class (\w+)[^{};]*\{\n(.*?)^\}", re.M | re.S)
 MODIFIERS = r"(?:(?:public|private|protected|static|override|readonly|abstract|async|declare) )*"
 METHOD = re.compile(rf"^  {MODIFIERS}(?:get |set |\*)?(?!constructor\b)[#\w]+(?:<[^\n]*?>)?\(", re.M)
 MEMBER = re.compile(rf"^  {MODIFIERS}[#\w]+[?!]?(?: =|:|;)", re.M)

@@ -152,6 +152,8 @@ class EachRule(unittest.TestCase):
         self.assertEqual(count(house_rules.MAX_METHODS + 1, 0), 1)
         self.assertEqual(count(0, house_rules.MAX_MEMBERS + 1), 1)
         self.assertEqual(count(0, house_rules.MAX_MEMBERS, 1), 1)
+        body = "".join(f"  member{i} = 1;\n" for i in range(house_rules.MAX_MEMBERS + 1))
+        self.assertEqual(self.importing(rule, ui__a="export class A\n  extends B\n  implements C\n{\n" + body + "}\n"), 1)
 
     def test_homes_of_libraries(self):
         def count(file, header):
