@@ -51,6 +51,22 @@ class PutOff : public ::testing::Test {
   std::unique_ptr<solver::Transport> transport_;
 };
 
+// Whoever asks without a pause only delays it: each time that nothing came of it, it is left alone twice as long.
+TEST_F(PutOff, aLongShotIsDoneInTheEndHoweverOftenSomebodyIsWaiting) {
+  transport_->setImpatience([] { return true; });
+  auto batch = endless();
+  batch.scatter.clear();
+  batch.gather.resize(1);
+  batch.gather[0].point_count = 1'000;
+  std::size_t taken = 0, tries = 0;
+  while (taken == 0 && ++tries < 12) {
+    const auto done = transport_->measure(batch, [&](std::size_t, auto&&) { ++taken; });
+    ASSERT_TRUE(done || done.error().code == ErrorCode::kCancelled);
+  }
+  EXPECT_EQ(taken, 1U);
+  EXPECT_GT(tries, 1U) << "it took less than it is left alone for at first, and shows nothing";
+}
+
 TEST_F(PutOff, aMeasurementInTheMiddleOfAShotEndsSoon) {
   transport_->setImpatience([] { return true; });
   const auto begun = Clock::now();
