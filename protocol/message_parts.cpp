@@ -88,6 +88,8 @@ json toJson(const Progress& p) {
               {"nodes", p.nodes},
               {"surfaces", p.surfaces},
               {"polygons", p.polygons}};
+  if (p.error.surface) out["error"]["surface"] = *p.error.surface;
+  if (p.error.p95) out["error"]["p95"] = *p.error.p95;
   if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
   if (!p.failure.empty()) out["failure"] = p.failure;
   if (!p.unlit.empty()) out["unlit"] = p.unlit;
@@ -110,6 +112,8 @@ void read(Reader& r, Progress& p) {
     e.number("sampling", p.error.sampling, Need::kRequired, {});
     e.number("variation", p.error.variation, Need::kOptional, {});
     e.number("discretization", p.error.discretization, Need::kRequired, {});
+    e.optionalNumber("surface", p.error.surface, {});
+    e.optionalNumber("p95", p.error.p95, {});
   });
   r.object("energy", Need::kOptional, [&](Reader& e) {
     e.number("emitted", p.energy.emitted, Need::kRequired, kAny);

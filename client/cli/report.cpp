@@ -46,6 +46,8 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
                 {"sampling", progress.error.sampling},
                 {"variation", progress.error.variation},
                 {"discretization", progress.error.discretization}}},
+              {"surface_error", progress.error.surface ? json(*progress.error.surface) : json(nullptr)},
+              {"surface_p95", progress.error.p95 ? json(*progress.error.p95) : json(nullptr)},
               {"energy",
                {{"emitted", progress.energy.emitted},
                 {"absorbed", progress.energy.absorbed},
@@ -131,7 +133,10 @@ std::string outcomeText(const protocol::Progress& progress) {
                      countText(progress.shots), countText(progress.patches), progress.revision);
 }
 
-std::string finerTexelsText(const protocol::ErrorParts& error) {
+std::string surfaceText(const protocol::ErrorParts& error) {
+  if (error.surface && error.p95)
+    return fmt::format("; {} at the surface, 95 % of places within {}", percentText(*error.surface),
+                       percentText(*error.p95));
   if (!(error.discretization > error.total)) return {};
   return fmt::format("; finer texels would change {}", percentText(error.discretization));
 }

@@ -28,6 +28,6 @@ namespace radiosity::cli {
 
 /// "; finer texels would change 3.8 %" where that is more than the error: more shots are not what is missing. Else
 /// empty.
-[[nodiscard]] std::string finerTexelsText(const protocol::ErrorParts& error);
+[[nodiscard]] std::string surfaceText(const protocol::ErrorParts& error);
 
 }  // namespace radiosity::cli

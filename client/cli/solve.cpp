@@ -79,7 +79,7 @@ class Solve {
     if (auto loaded = load(*connection); !loaded) return complainOf(loaded.error());
     auto status = waitForEnd(*connection);
     if (!status) return complainOf(status.error());
-    return finish(*status);
+    return finish(*connection, *std::move(status));
   }
 
   Result<void> checkInputs() {
@@ -227,7 +227,21 @@ class Solve {
     }
   }
 
-  ExitCode finish(const protocol::StatusReply& status) {
+  /// What people see of the error is measured while the result is being fetched. Of a solve that is not the one that
+  /// was waited for any more nothing is told.
+  static void addSurfaceError(client::Connection& connection, protocol::StatusReply& status) {
+    constexpr std::chrono::milliseconds kPatience = 60s;
+    (void)connection.call(protocol::SolveWaitCall{.revision = status.progress.revision,
+                                                  .timeout_ms = static_cast<std::uint64_t>(kPatience.count())},
+                          kPatience + 10s);
+    const auto now = connection.call(protocol::StatusCall{});
+    if (!now || now->progress.revision != status.progress.revision || now->progress.shots != status.progress.shots)
+      return;
+    status.progress.error.surface = now->progress.error.surface;
+    status.progress.error.p95 = now->progress.error.p95;
+  }
+
+  ExitCode finish(client::Connection& connection, protocol::StatusReply status) {
     const bool reached = status.progress.error.total <= options_.error;
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings",
@@ -239,6 +253,7 @@ class Solve {
                               .error_map = options_.error_map},
                              display_);
     if (!written) return complainOf(CallFailure{written.error()});
+    addSurfaceError(connection, status);
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
       if (!done) return complain(done.error());
@@ -252,7 +267,7 @@ class Solve {
     const std::string why =
         status.progress.state == "limited" ? "limited (" + oneLine(failure) + "): " : "time limit: ";
     std::fprintf(stderr, "%s%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str(),
-                 finerTexelsText(status.progress.error).c_str());
+                 surfaceText(status.progress.error).c_str());
     return reached ? ExitCode::kOk : ExitCode::kShort;
   }
 

@@ -32,6 +32,14 @@ struct ErrorEstimate {
   double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
 };
 
+/// What people see of it: how far bilinear lookups in lightmaps are off at random places of surfaces, measured there by
+/// rays once light is solved for. Relative to the RMS of irradiance.
+struct SurfaceEstimate {
+  double total = 0.0;      ///< RMS over places
+  double deviation = 0.0;  ///< standard deviation of that
+  double p95 = 0.0;        ///< 95 % of places are off by less, each relative to its own light
+};
+
 /// Luminous flux, lumens (luminance: the channels weighted by Rec. 709).
 /// emitted = absorbed + escaped + backface + unshot + imbalance.
 struct EnergyBalance {
@@ -102,6 +110,8 @@ struct Status {
   double seconds = 0.0;                ///< solve time, without start-up and loading
   std::optional<double> seconds_left;  ///< estimate to the target error
   ErrorEstimate error;
+  std::optional<SurfaceEstimate> surface_error;  ///< nothing: it is not measured, yet
+  bool probes_surface = false;                   ///< it is being measured
   EnergyBalance energy;
   std::uint64_t patches = 0;  ///< leaf patches with area
   std::uint64_t nodes = 0, surfaces = 0, polygons = 0, pages = 0;

@@ -55,6 +55,10 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.seconds = finite(s.seconds, 0.0);
   if (s.seconds_left && std::isfinite(*s.seconds_left)) p.seconds_left = std::max(0.0, *s.seconds_left);
   p.error = toErrorParts(s.error);
+  if (s.surface_error) {
+    p.error.surface = finite(s.surface_error->total, 1e9);
+    p.error.p95 = finite(s.surface_error->p95, 1e9);
+  }
   p.energy = {finite(s.energy.emitted, 0.0),  finite(s.energy.absorbed, 0.0), finite(s.energy.escaped, 0.0),
               finite(s.energy.backface, 0.0), finite(s.energy.unshot, 0.0),   finite(s.energy.imbalance, 0.0)};
   p.patches = s.patches;

@@ -63,6 +63,10 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.sample("error_ratio", status.error.sampling, "{part=\"sampling\"}");
   text.sample("error_ratio", status.error.variation, "{part=\"variation\"}");
   text.sample("error_ratio", status.error.discretization, "{part=\"discretization\"}");
+  if (status.surface_error) {
+    text.sample("error_ratio", status.surface_error->total, "{part=\"surface\"}");
+    text.sample("error_ratio", status.surface_error->p95, "{part=\"p95\"}");
+  }
   text.family("energy_lumens", "gauge", "Where the light went.");
   text.sample("energy_lumens", status.energy.emitted, "{part=\"emitted\"}");
   text.sample("energy_lumens", status.energy.absorbed, "{part=\"absorbed\"}");

@@ -57,6 +57,7 @@ OWN_INCLUDES = [
         "edits": "math patches transport",
         "reflected": "edits math patches rays",
         "variation": "edits lamps math patches rays reflected",
+        "surface": "lamps math patches rays",
     }, SOLVER),
     *among("solver", {
         "shooting": "error math patches transport",

@@ -214,6 +214,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
   settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources(*scene_);
   light_report_.forgetLost();
+  forgetSurface();
   solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_, former, normals_);
   solver_power_ = power_ = emittedPower();
 }
@@ -333,6 +334,7 @@ bool LitScene::showDirectLight() {
 void LitScene::updateSolver(bool materials, bool lights) {
   sources_ = lightSources(*scene_);
   light_report_.forgetLost();
+  forgetSurface();
   const double power_before = std::exchange(power_, emittedPower());
   // Integers have a scale that was chosen for the power at the start. Far outside it they could overflow or lose the
   // small lights.
@@ -408,6 +410,12 @@ std::vector<glm::vec3> LitScene::ownLight() const {
   std::vector<glm::vec3> irradiance = solver_->irradiance();
   for (auto& value : irradiance) value = glm::max(value, 0.0F);
   return irradiance;
+}
+
+void LitScene::probeSurface(double seconds) {
+  const auto irradiance = ownLight();
+  surface_probe_.advance({*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
+                         [this] { return pages(); }, seconds);
 }
 
 std::vector<scene::LightmapPage> LitScene::pages() const { return scene::assemblePages(*patches_, ownLight()); }

@@ -13,6 +13,7 @@
 #include "server/engine/engine.h"
 #include "server/engine/lit/light_report.h"
 #include "server/engine/lit/scene_change.h"
+#include "server/engine/lit/surface_probe.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
 #include "server/scene/lightmap/lightmap.h"
@@ -176,6 +177,13 @@ class LitScene {
   /// changed. Once for each edit; costs two passes over the pages.
   [[nodiscard]] bool showDirectLight();
 
+  /// Goes on for about `seconds` with measuring what surfaceError() tells of the light that there is.
+  void probeSurface(double seconds);
+  /// The light has been solved further.
+  void forgetSurface() { surface_probe_.forget(); }
+  /// Nothing: it is not measured.
+  [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
+
  private:
   LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
       : document_(std::make_shared<const scene::Document>(std::move(edited.document))),
@@ -227,6 +235,7 @@ class LitScene {
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
   LightReport light_report_;
+  SurfaceProbe surface_probe_;
   bool stale_ = false;
   bool reproducible_ = true;
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()

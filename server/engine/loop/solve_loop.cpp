@@ -22,6 +22,9 @@ constexpr int kProgressShare = 10;
 /// A solve that took longer is worth a checkpoint at its end.
 constexpr double kLongSolveSeconds = 2.0;
 
+/// Of measuring what people see, between two looks at what else there is to do.
+constexpr double kProbeSeconds = 0.02;
+
 /// A solve that has come to its time limit takes in what is measured; where that takes longer it stays as it is.
 constexpr double kLimitGrace = 3.0;
 
@@ -128,7 +131,7 @@ bool SolveLoop::runCommands() {
 }
 
 bool SolveLoop::hasNothingToDo() const {
-  return first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
+  return first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind() && !probesSurface();
 }
 
 void SolveLoop::runCommand(const CommandQueue::Command& command) {
@@ -153,6 +156,8 @@ void SolveLoop::takeTurn() {
       solveSlice();
     else if (isBehind())
       catchUp();
+    else if (probesSurface())
+      probeSurface();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
     texels_.forget();
@@ -256,6 +261,18 @@ void SolveLoop::catchUp() {
   updateStatus(true);
 }
 
+bool SolveLoop::probesSurface() const {
+  const bool is_solved = state_ == SolveState::kConverged || state_ == SolveState::kLimited ||
+                         state_ == SolveState::kTimeLimit;
+  return is_solved && lit_ && !lit_->isStale() && !lit_->surfaceError() && !isBehind();
+}
+
+/// Takes no solve time: what is shown stays what it is.
+void SolveLoop::probeSurface() {
+  lit_->probeSurface(kProbeSeconds);
+  if (lit_->surfaceError()) updateStatus(true);
+}
+
 void SolveLoop::tellProgress(bool assess) {
   if (Clock::now() < next_progress_) return;
   const auto begin = threadTime();
@@ -282,6 +299,7 @@ void SolveLoop::endSolve(SolveState state) {
     if (state != SolveState::kFailed) lit_->endFade();
     if (state != SolveState::kFailed) tellLostLight();
   }
+  if (lit_) lit_->forgetSurface();
   const bool reported = publishLightmaps(true);
   updateStatus(true, reported);
   disposer_.dispose(std::exchange(retired_, nullptr));
@@ -308,6 +326,7 @@ void SolveLoop::updateStatus(bool announce, bool as_reported) {
   status.seconds = seconds_;
   status.settings = settings_;
   status.failure = failure_;
+  status.probes_surface = probesSurface();
   status.renderer_lost = renderer_lost_;
   status.renderers_replaced = losses_told_;
   status.solve_restarts = solve_restarts_;

@@ -123,6 +123,9 @@ class SolveLoop final : public Engine {
   /// While a step is under way: the solve thread has something to do that does not wait for its end.
   [[nodiscard]] bool isWantedElsewhere() const;
   void catchUp();
+  /// Solved; what people see of its error is still to be measured.
+  [[nodiscard]] bool probesSurface() const;
+  void probeSurface();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();

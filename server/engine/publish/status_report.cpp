@@ -82,6 +82,8 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.shots_per_second = seconds > 0.0 ? static_cast<double>(status.shots) / seconds : 0.0;
   const auto& error = solver.error();
   status.error = {error.total, error.residual, error.sampling, error.variation, error.discretization};
+  if (const auto& surface = lit.surfaceError())
+    status.surface_error = SurfaceEstimate{surface->total, surface->deviation, surface->p95};
   const double target = lit.settings().target_error;
   // Sampling error falls with the square root of time.
   if (error.total > target && error.total < 1.0)

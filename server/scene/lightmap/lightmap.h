@@ -2,7 +2,9 @@
 // is right. Pure functions of values; run on the solve thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -27,6 +29,10 @@ enum class Seams { kStitched, kLeft };
 /// share an edge are stitched (irradiance is continuous there; other values need not be: kLeft); gutters are dilated.
 [[nodiscard]] std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
                                                       Seams seams = Seams::kStitched);
+
+/// As engines look it up, bilinearly: at `texel` of the chart of a side, which has texels.
+[[nodiscard]] glm::vec3 lookUp(const PatchScene& patches, std::span<const LightmapPage> pages, std::uint32_t surface,
+                               std::size_t side, const glm::vec2& texel);
 
 /// Next coarser mip: coverage-weighted mean of 2x2, so that charts do not bleed into gutters.
 [[nodiscard]] LightmapPage coarserMip(const LightmapPage& page);

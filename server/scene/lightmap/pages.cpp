@@ -333,6 +333,20 @@ std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<con
   return PageMaker(patches, node_values).make(seams);
 }
 
+glm::vec3 lookUp(const PatchScene& patches, std::span<const LightmapPage> pages, std::uint32_t surface,
+                 std::size_t side, const glm::vec2& texel) {
+  const PagePlace& place = patches.surfaces[surface].place[side];
+  const Image& page = pages[place.page].irradiance;
+  const glm::vec2 most(page.width - 1, page.height - 1);
+  const glm::vec2 at = glm::clamp(texel + glm::vec2(place.x, place.y) - 0.5F, glm::vec2(0.0F), most);
+  const glm::vec2 low = glm::floor(at), high = glm::min(low + 1.0F, most), part = at - low;
+  const auto pixel = [&](float x, float y) {
+    return page.pixels[page.index(static_cast<int>(x), static_cast<int>(y))];
+  };
+  return glm::mix(glm::mix(pixel(low.x, low.y), pixel(high.x, low.y), part.x),
+                  glm::mix(pixel(low.x, high.y), pixel(high.x, high.y), part.x), part.y);
+}
+
 LightmapPage coarserMip(const LightmapPage& page) {
   const int width = page.irradiance.width, height = page.irradiance.height;
   LightmapPage coarse;

@@ -149,6 +149,10 @@ LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) con
           triangle};
 }
 
+glm::dvec2 LeafRays::texelOf(const Place& place) const {
+  return texelAt(patches_.triangles[place.triangle], place.position);
+}
+
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, double reach) const {
   Sight sight;
   sight.distance = reach;

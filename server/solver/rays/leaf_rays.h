@@ -47,6 +47,8 @@ class LeafRays {
 
   /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
   [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
+  /// Where in its chart a place lies that knows its triangle.
+  [[nodiscard]] glm::dvec2 texelOf(const Place& place) const;
   /// What lies that way within `reach` (unit box), in single precision; `value` is kNothing where nothing does, and
   /// where it is no leaf.
   struct Sight {

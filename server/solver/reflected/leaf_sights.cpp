@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <numeric>
 
 #include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/solver/math/halves.h"
+#include "server/solver/rays/ray_order.h"
 
 namespace radiosity::solver {
 namespace {
@@ -25,43 +25,6 @@ constexpr std::size_t kMostSteps = 32;
 constexpr std::size_t kFewSteps = 8;
 /// Of steps, so that no slice makes more than 32 bits number.
 constexpr std::size_t kMostNumbers = std::size_t{1} << 30;
-
-/// Rays of a leaf that are to be traced, in the order in which they are: those that go the same way together, since a
-/// packet of them takes half as long. A grid over the draws of the direction has about a packet in each cell.
-class Pending {
- public:
-  struct Ray {
-    std::uint32_t number;
-    glm::dvec4 draw;
-  };
-
-  void clear() {
-    rays_.clear();
-    cell_.clear();
-  }
-  void add(std::uint32_t number, const glm::dvec4& draw) { rays_.push_back({number, draw}); }
-  [[nodiscard]] std::size_t size() const { return rays_.size(); }
-  /// `place` of the order.
-  [[nodiscard]] const Ray& operator[](std::size_t place) const { return rays_[order_[place]]; }
-
-  void sort() {
-    const auto across = std::max(1U, static_cast<std::uint32_t>(std::sqrt(rays_.size() / geometry::kPacket)));
-    first_.assign(std::size_t{across} * across + 1, 0);
-    for (const auto& ray : rays_) {
-      const auto row = static_cast<std::uint32_t>(ray.draw.x * across);
-      const auto column = static_cast<std::uint32_t>(ray.draw.y * across);
-      cell_.push_back(row * across + (row % 2 == 0 ? column : across - 1 - column));
-      ++first_[cell_.back() + 1];
-    }
-    std::partial_sum(first_.begin(), first_.end(), first_.begin());
-    order_.resize(rays_.size());
-    for (std::uint32_t i = 0; i < rays_.size(); ++i) order_[first_[cell_[i]]++] = i;
-  }
-
- private:
-  std::vector<Ray> rays_;
-  std::vector<std::uint32_t> cell_, order_, first_;
-};
 
 }  // namespace
 
@@ -201,7 +164,7 @@ std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::
   const auto draw = draws(value, side, half);
   const auto chance = mixKeys(keyOf(value, side, half), 1);
   const auto first = firstOf(value);
-  thread_local Pending pending;
+  thread_local RayOrder pending;
   pending.clear();
   for (std::uint32_t k = 0; k < count_[value]; ++k)
     if (endAt(half, first + k) == kUntraced) pending.add(k, draw(k));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/parallel.h"
+#include "server/solver/lamps/unhidden.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/patches/unshot_pyramid.h"
@@ -18,54 +19,10 @@ namespace {
 /// From farther away than so many widths of a leaf its light might as well be even: what sees all of it sees all parts
 /// alike.
 constexpr double kNear = 4.0;
-/// Nearer to a lamp's plane than this (unit box) is on it.
-constexpr double kOnLamp = 1e-6;
-/// Light from directions without an end comes from there.
-constexpr double kFar = 4.0;
 /// Fewer tasks than these are not worth a thread's turn.
 constexpr std::size_t kTasksAShare = 64;
 
-using Kind = PunctualLights::Source::Kind;
-
 std::uint64_t keyOfLight(std::uint64_t path_key) { return mixKeys(path_key, 3); }
-
-/// Form factor of the whole lamp.
-double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
-  if (glm::dot(place.position - glm::dvec3(lamp.corners[0]), glm::dvec3(lamp.normal)) <= kOnLamp) return 0.0;
-  return polygonFormFactor(place.position, place.normal, std::span(lamp.corners.data(), lamp.corner_count));
-}
-
-/// The way to a source.
-glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place) {
-  if (source.kind == Kind::kDirectional) return kFar * glm::dvec3(source.direction);
-  return glm::dvec3(source.position) - place.position;
-}
-
-/// Irradiance for an intensity of one; of the sky none, since paths see that where they end.
-double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place) {
-  if (source.kind == Kind::kSky) return 0.0;
-  const glm::dvec3 way = wayTo(source, place), axis(source.direction);
-  const double distance = glm::length(way), cosine = distance > 0.0 ? glm::dot(place.normal, way) / distance : 0.0;
-  if (cosine <= 0.0 || source.kind == Kind::kDirectional) return std::max(0.0, cosine);
-  double strength = 1.0;
-  if (source.kind == Kind::kSpot) {
-    const double fade = std::clamp(-glm::dot(axis, way) / distance * static_cast<double>(source.cone_scale) +
-                                       static_cast<double>(source.cone_offset),
-                                   0.0, 1.0);
-    strength = fade * fade;
-  }
-  if (source.range > 0.0F)
-    strength *= std::clamp(1.0 - std::pow(distance / static_cast<double>(source.range), 4.0), 0.0, 1.0);
-  return strength * cosine / (distance * distance);
-}
-
-glm::vec3 skyRadiosity(bool above, std::span<const PunctualLights::Source> sources) {
-  glm::dvec3 sum(0.0);
-  for (const auto& source : sources) {
-    if (source.kind == Kind::kSky && (source.direction.y > 0.0F) == above) sum += std::numbers::pi * source.intensity;
-  }
-  return glm::vec3(sum);
-}
 
 }  // namespace
 

@@ -44,9 +44,9 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
 }
 
 TEST(OutcomeText, saysThatTexelsAreTooLargeOnlyWhereTheyAreWhatLimits) {
-  EXPECT_EQ(finerTexelsText({0.0142, 0.004, 0.0137, 0.001, 0.0381}), "; finer texels would change 3.81 %");
-  EXPECT_EQ(finerTexelsText({0.018, 0.001, 0.017, 0.003, 0.002}), "");
-  EXPECT_EQ(finerTexelsText({0.018, 0.001, 0.017, 0.0, std::nan("")}), "");
+  EXPECT_EQ(surfaceText({0.0142, 0.004, 0.0137, 0.001, 0.0381}), "; finer texels would change 3.81 %");
+  EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.003, 0.002}), "");
+  EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.0, std::nan("")}), "");
 }
 
 TEST(OutcomeText, statesNoErrorWhereNoLightArrives) {

@@ -1,0 +1,25 @@
+// What a lamp brings to a place when nothing stands between. Pure functions of values; any thread.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/patches/lights.h"
+#include "server/solver/rays/leaf_rays.h"
+
+namespace radiosity::solver {
+
+/// Form factor of the whole lamp; 0 behind it, and in its plane.
+[[nodiscard]] double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place);
+
+/// The way from a place to a source, whose light arrives where nothing lies on it.
+[[nodiscard]] glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place);
+
+/// Irradiance for an intensity of one; 0 of the sky, which rays see where they end.
+[[nodiscard]] double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place);
+
+/// Of what of the sky is above the horizon, or below it: lm/m^2 for the whole hemisphere.
+[[nodiscard]] glm::vec3 skyRadiosity(bool above, std::span<const PunctualLights::Source> sources);
+
+}  // namespace radiosity::solver

@@ -1,0 +1,227 @@
+#include "server/solver/surface/place_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/solver/lamps/unhidden.h"
+#include "server/solver/math/polygon_form_factor.h"
+#include "server/solver/math/sampling.h"
+#include "server/solver/rays/ray_order.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Of more lamps than these some are drawn.
+constexpr std::size_t kEachLamp = 32;
+constexpr std::uint32_t kDraws = 64;
+/// Points on a lamp that look first, and so many where these do not agree.
+constexpr std::uint32_t kFirstLooks = 8, kAllLooks = PlaceLight::kMostLooks;
+static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPacket == 0);
+/// Ways to a lamp end so far before it (unit box), well above the rounding of positions.
+constexpr double kLift = 2e-6;
+/// A ray goes on from so many leaves at most that something cuts.
+constexpr std::size_t kMostSteps = 8;
+/// What a way in single precision is sent to is known to so much (unit box).
+constexpr double kNearEnd = 1e-5;
+
+float strongest(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}); }
+
+}  // namespace
+
+PlaceLight::PlaceLight(const SolvedScene& solved)
+    : patches_(solved.patches), sides_(makeSides(patches_)), rays_(solved.rays), normals_(solved.normals) {
+  if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, sides_);
+  auto lamps = findLightPolygons(patches_, sides_, solved.materials.emission);
+  std::erase_if(lamps, [](const LightPolygon& lamp) { return lamp.emission == glm::vec3(0.0F); });
+  if (lamps.size() <= kEachLamp) {
+    lamps_ = std::move(lamps);
+  } else {
+    std::vector<float> strengths;
+    for (const auto& lamp : lamps) strengths.push_back(strongest(lamp.emission));
+    many_.emplace(std::move(lamps), strengths);
+  }
+  const PunctualLights punctual(patches_, solved.sources, {});
+  sources_ = punctual.makeSources(patches_, solved.sources);
+  sky_ = {glm::dvec3(skyRadiosity(true, sources_)), glm::dvec3(skyRadiosity(false, sources_))};
+  std::erase_if(sources_, [](const auto& source) { return source.kind == PunctualLights::Source::Kind::kSky; });
+  for (const auto& side : sides_) {
+    const auto emission = solved.materials.emission.side(side.number);
+    const auto reflectance = solved.materials.reflectance.side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      emission_.push_back(side.gathered ? glm::vec3(0.0F) : emission[leaf]);
+      reflectance_.push_back(reflectance[leaf]);
+      radiosity_.push_back(emission_.back() + reflectance_.back() * solved.irradiance[side.first_node + leaf]);
+    }
+  }
+}
+
+PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) const {
+  Spot spot;
+  spot.place = rays_->placeOn(value, at);
+  spot.texel = glm::vec2(rays_->texelOf(spot.place));
+  const bool is_front = rays_->sideOf(value).side == 0;
+  spot.shading = spot.place.normal;
+  if (normals_ && normals_->has(spot.place.triangle)) {
+    const auto front = is_front ? spot.place.normal : -spot.place.normal;
+    const auto shading = normals_->at(spot.place.triangle, spot.texel, front);
+    spot.shading = is_front ? shading : -shading;
+  }
+  return spot;
+}
+
+glm::dvec3 PlaceLight::arriving(const Spot& spot, std::uint64_t key) const {
+  return direct(spot, mixKeys(key, 1)) + reflected(spot, mixKeys(key, 2), kRays, kMostSteps);
+}
+
+/// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
+glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays, std::size_t steps) const {
+  const Sobol4 draws(key);
+  RayOrder order;
+  for (std::uint32_t k = 0; k < rays; ++k) order.add(k, draws(k));
+  order.sort();
+  std::array<LeafRays::Place, geometry::kPacket> from;
+  from.fill(spot.place);
+  std::array<glm::dvec3, geometry::kPacket> direction;
+  std::array<geometry::Hit, geometry::kPacket> hit;
+  glm::dvec3 sum(0.0);
+  for (std::size_t first = 0; first < order.size(); first += geometry::kPacket) {
+    const auto together = std::min<std::size_t>(geometry::kPacket, order.size() - first);
+    for (std::size_t i = 0; i < together; ++i)
+      direction[i] = cosineDirection(spot.place.normal, order[first + i].draw.x, order[first + i].draw.y);
+    rays_->meetFirst(std::span(from).first(together), std::span(direction).first(together),
+                     std::span(hit).first(together));
+    for (std::size_t i = 0; i < together; ++i) {
+      const double cosine = glm::dot(spot.place.normal, direction[i]);
+      const double weight = std::max(0.0, glm::dot(spot.shading, direction[i])) / std::max(cosine, 1e-6);
+      if (weight <= 0.0) continue;
+      const auto of_ray = mixKeys(key, order[first + i].number);
+      LeafRays::Place end;
+      const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
+      sum += weight * leaving(value, end, of_ray, steps);
+    }
+  }
+  return sum / static_cast<double>(rays);
+}
+
+/// Towards whoever sees it there: of a leaf that something cuts the light of that very place.
+glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
+                               std::size_t steps) const {
+  if (value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow) return sky_[value == LeafRays::kSkyAbove ? 0 : 1];
+  if (value == LeafRays::kNothing) return glm::dvec3(0.0);
+  if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
+  const Spot there{end, end.normal, {}};
+  const auto arrives = direct(there, mixKeys(key, 3)) + reflected(there, mixKeys(key, 4), 1, steps - 1);
+  return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;
+}
+
+glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < lamps_.size(); ++i)
+    sum += fromLamp(lamps_[i], spot, mixKeys(key, i)) * glm::dvec3(lamps_[i].emission);
+  if (many_) sum += fromSomeLamps(spot, key);
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const auto& place = spot.place;
+    const auto way = wayTo(sources_[i], place);
+    if (glm::dot(place.normal, way) <= 0.0) continue;
+    auto shaded = place;
+    shaded.normal = spot.shading;
+    const double arrives = unhiddenSource(sources_[i], shaded);
+    if (arrives > 0.0 && isOpen(place, place.position + way, glm::dvec3(0.0), mixKeys(key, ~i)))
+      sum += arrives * sources_[i].intensity;
+  }
+  return sum;
+}
+
+/// For an emission of one: the exact form factor of all of it, times the part of that which is seen.
+double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const {
+  const auto& place = spot.place;
+  if (unhiddenLight(lamp, place) <= 0.0) return 0.0;
+  const std::span corners(lamp.corners.data(), lamp.corner_count);
+  const auto factors = formFactorsAboveBoth(place.position, place.normal, spot.shading, corners);
+  if (factors.shading <= 0.0) return 0.0;
+  std::array<double, 2> weights{};
+  const double first = seenPart(lamp, spot, key, 0, kFirstLooks, weights);
+  const bool agree = first <= 0.0 || first >= 1.0;
+  return factors.shading * (agree ? first : seenPart(lamp, spot, key, kFirstLooks, kAllLooks, weights));
+}
+
+/// By points first .. end - 1 of the lamp, and by what `weights` has of others: of what is seen, of all.
+double PlaceLight::seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
+                            std::uint32_t end, std::array<double, 2>& weights) const {
+  const auto& place = spot.place;
+  const Sobol4 draws(key);
+  std::array<glm::dvec3, kAllLooks> point;
+  std::array<double, kAllLooks> weight{};
+  for (auto k = first; k < end; ++k) {
+    const auto at = draws(k);
+    point[k] = glm::dvec3(lamp.point(at.x, at.y));
+    const auto way = point[k] - place.position;
+    const double leaves = -glm::dot(glm::dvec3(lamp.normal), way), square = glm::dot(way, way);
+    if (glm::dot(place.normal, way) > 0.0 && leaves > 0.0)
+      weight[k] = std::max(0.0, glm::dot(spot.shading, way)) * leaves / (square * square);
+    weights[1] += weight[k];
+  }
+  const auto open = areOpen(place, std::span(point).subspan(first, end - first), glm::dvec3(lamp.normal), key + first);
+  for (auto k = first; k < end; ++k) weights[0] += open[k - first] ? weight[k] : 0.0;
+  return weights[1] > 0.0 ? weights[0] / weights[1] : 0.0;
+}
+
+/// Whether nothing lies on the ways to points of a lamp, geometry::kPacket of which are asked together.
+std::bitset<PlaceLight::kMostLooks> PlaceLight::areOpen(const LeafRays::Place& from, std::span<const glm::dvec3> points,
+                                                        const glm::dvec3& normal, std::uint64_t key) const {
+  std::bitset<kMostLooks> open;
+  if (!patches_.opacity.empty()) {
+    for (std::size_t k = 0; k < points.size(); ++k) open[k] = isOpen(from, points[k], normal, mixKeys(key, k));
+    return open;
+  }
+  LeafRays::Points ends;
+  for (const auto& point : points) {
+    const glm::vec3 end(point + kLift * normal);
+    ends.x.push_back(end.x);
+    ends.y.push_back(end.y);
+    ends.z.push_back(end.z);
+  }
+  std::array<std::int32_t, kMostLooks> hidden;
+  rays_->hide(LeafRays::startOf(from), ends, hidden.data());
+  for (std::size_t k = 0; k < points.size(); ++k) open[k] = hidden[k] == 0;
+  return open;
+}
+
+glm::dvec3 PlaceLight::fromSomeLamps(const Spot& spot, std::uint64_t key) const {
+  const auto& place = spot.place;
+  const auto from = LeafRays::startOf(place);
+  const Sobol4 draws(key);
+  glm::dvec3 sum(0.0);
+  for (std::uint32_t k = 0; k < kDraws; ++k) {
+    const auto at = draws(k);
+    const auto drawn = many_->draw(from, glm::vec3(place.normal), at.x);
+    if (drawn.light == scene::kNone) continue;
+    const auto& lamp = many_->lights()[drawn.light];
+    const glm::dvec3 point(lamp.point(at.y, at.z));
+    const auto way = point - place.position;
+    const double leaves = -glm::dot(glm::dvec3(lamp.normal), way), square = glm::dot(way, way);
+    const double arrives = glm::dot(place.normal, way) > 0.0 ? glm::dot(spot.shading, way) : 0.0;
+    if (!(arrives > 0.0 && leaves > 0.0)) continue;
+    if (!isOpen(place, point, glm::dvec3(lamp.normal), mixKeys(key, k))) continue;
+    sum += lamp.area * arrives * leaves / (std::numbers::pi * square * square * drawn.chance) *
+           glm::dvec3(lamp.emission);
+  }
+  return sum / static_cast<double>(kDraws);
+}
+
+/// What one can see through stops a way or not, by chance from `key`.
+bool PlaceLight::isOpen(const LeafRays::Place& from, const glm::dvec3& to, const glm::dvec3& normal,
+                        std::uint64_t key) const {
+  if (patches_.opacity.empty()) return rays_->isOpen(from, to, normal);
+  const auto way = to - from.position;
+  const double length = glm::length(way);
+  if (!(length > kNearEnd)) return false;
+  LeafRays::Place end;
+  const auto value = rays_->see(from, way / length, key, end);
+  if (value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow) return true;
+  return glm::distance(end.position, from.position) >= length - kNearEnd;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,85 @@
+// How much light arrives at single places of surfaces, whatever the texels there have of it: from lamps, which are
+// looked at from the place, and from all else by rays, which bring what the leaves have that they end on. Two
+// independent estimates, neither of which knows of texels. Immutable; any thread.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/lamps/light_tree.h"
+#include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/patches/lights.h"
+#include "server/solver/rays/leaf_rays.h"
+
+namespace radiosity::solver {
+
+/// A solved scene. What it refers to is to outlive whoever has it, but for `materials`, `sources` and `irradiance`.
+struct SolvedScene {
+  const scene::PatchScene& patches;
+  std::shared_ptr<const LeafRays> rays;  ///< of it; null: they are made
+  std::shared_ptr<const scene::ShadingNormals> normals;
+  const scene::PatchMaterials& materials;
+  const LightSources& sources;
+  std::span<const glm::vec3> irradiance;  ///< lux, by node of level 0
+};
+
+class PlaceLight {
+ public:
+  /// Samples of each of the two estimates.
+  static constexpr std::uint32_t kRays = 128;
+  /// Points of a lamp, at most, that look at a place.
+  static constexpr std::uint32_t kMostLooks = 32;
+
+  /// O(n log n) in triangles where rays are to be made, else in leaves. Throws std::bad_alloc.
+  explicit PlaceLight(const SolvedScene& solved);
+
+  /// Where on a leaf; the normal of `place` is the geometric one of the lit side.
+  struct Spot {
+    LeafRays::Place place;
+    glm::dvec3 shading{0.0};  ///< normal that light is told for, on the same side
+    glm::vec2 texel{0.0F};    ///< of its chart
+  };
+  /// At (u, v) in [0, 1)^2 of a leaf that has area, evenly.
+  [[nodiscard]] Spot spotOn(std::uint32_t value, const glm::vec2& at) const;
+  /// Irradiance, lux. The same key gives the same bits. Cost: kRays rays, and of each lamp some tens more where it is
+  /// seen in part; of more than kEachLamp of them 64 in all.
+  [[nodiscard]] glm::dvec3 arriving(const Spot& spot, std::uint64_t key) const;
+
+  [[nodiscard]] const std::vector<Side>& sides() const { return sides_; }
+  [[nodiscard]] const LeafRays& rays() const { return *rays_; }
+
+ private:
+  [[nodiscard]] glm::dvec3 reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays, std::size_t steps) const;
+  [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
+                                   std::size_t steps) const;
+  [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] glm::dvec3 fromSomeLamps(const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] double seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
+                                std::uint32_t end, std::array<double, 2>& weights) const;
+  [[nodiscard]] std::bitset<kMostLooks> areOpen(const LeafRays::Place& from, std::span<const glm::dvec3> points,
+                                                const glm::dvec3& normal, std::uint64_t key) const;
+  [[nodiscard]] bool isOpen(const LeafRays::Place& from, const glm::dvec3& to, const glm::dvec3& normal,
+                            std::uint64_t key) const;
+
+  const scene::PatchScene& patches_;
+  std::vector<Side> sides_;
+  std::shared_ptr<const LeafRays> rays_;
+  std::shared_ptr<const scene::ShadingNormals> normals_;
+  std::vector<LightPolygon> lamps_;  ///< each by itself; empty: there are too many, or none
+  std::optional<LightTree> many_;
+  std::vector<PunctualLights::Source> sources_;
+  std::array<glm::dvec3, 2> sky_{};  ///< above the horizon, below
+  /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
+  std::vector<glm::vec3> emission_, reflectance_, radiosity_;
+};
+
+}  // namespace radiosity::solver
