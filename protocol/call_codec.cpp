@@ -58,6 +58,7 @@ json params(const SolveConfigureCall& c) {
   if (c.sky) out["sky"] = toJson(*c.sky);
   if (c.no_sky) out["sky"] = nullptr;
   if (c.double_sided) out["doubleSided"] = *c.double_sided;
+  if (c.adaptive) out["adaptive"] = *c.adaptive;
   if (c.method) out["method"] = nameOf(*c.method);
   return out;
 }
@@ -158,6 +159,10 @@ void read(Reader& r, SolveConfigureCall& c) {
   if (bool given = false; r.find("doubleSided") != nullptr) {
     r.boolean("doubleSided", given, Need::kOptional);
     c.double_sided = given;
+  }
+  if (bool given = false; r.find("adaptive") != nullptr) {
+    r.boolean("adaptive", given, Need::kOptional);
+    c.adaptive = given;
   }
   if (Method given{}; r.find("method") != nullptr) {
     r.choice("method", given, Need::kOptional, methodFrom, kMethodNamesText);

@@ -15,6 +15,7 @@ json toJson(const Settings& s) {
           {"seed", s.seed},
           {"sky", s.sky ? toJson(*s.sky) : json(nullptr)},
           {"doubleSided", s.double_sided},
+          {"adaptive", s.adaptive},
           {"method", nameOf(s.method)}};
 }
 
@@ -61,6 +62,7 @@ void read(Reader& r, Settings& s) {
   r.integer("seed", s.seed, Need::kOptional, 0, std::numeric_limits<std::uint64_t>::max());
   readSky(r, s.sky);
   r.boolean("doubleSided", s.double_sided, Need::kOptional);
+  r.boolean("adaptive", s.adaptive, Need::kOptional);
   r.choice("method", s.method, Need::kOptional, methodFrom, kMethodNamesText);
 }
 

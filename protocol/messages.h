@@ -65,6 +65,7 @@ struct Settings {
   std::uint64_t seed = 1;
   std::optional<Sky> sky;  ///< none: JSON null
   bool double_sided = false;
+  bool adaptive = false;
   Method method = Method::kGather;
 };
 
@@ -252,6 +253,7 @@ struct SolveConfigureCall {
   std::optional<Sky> sky = {};
   bool no_sky = false;  ///< "sky": null
   std::optional<bool> double_sided = {};
+  std::optional<bool> adaptive = {};
   std::optional<Method> method = {};
 };
 struct SolvePauseCall {

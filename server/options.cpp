@@ -85,6 +85,9 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_flag(
       "--double-sided", o.solve.double_sided,
       "Light both sides of all surfaces, whatever their materials say: for rooms whose faces are turned outward");
+  app.add_flag("--adaptive", o.solve.adaptive,
+               "Choose texels, as few as meet the target where people look, finer where light wants it: --texels are "
+               "the most there may be");
   app.add_option(
          "--link-memory", o.solve.link_memory_bytes,
          "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "

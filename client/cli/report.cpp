@@ -25,6 +25,7 @@ json settingsJson(const protocol::Settings& settings) {
           {"seed", settings.seed},
           {"sky", settings.sky ? json{{"upper", settings.sky->upper}, {"lower", settings.sky->lower}} : json(nullptr)},
           {"double_sided", settings.double_sided},
+          {"adaptive", settings.adaptive},
           {"method", nameOf(settings.method)}};
 }
 

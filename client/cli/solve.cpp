@@ -40,7 +40,7 @@ struct SolveOptions {
   std::string visibility;        ///< empty: the server's choice
   std::string link_memory;       ///< as radiosityd takes it; empty: the server's choice
   std::string max_scene_memory;  ///< likewise
-  bool double_sided = false;
+  bool double_sided = false, adaptive = false;
   Method method = Method::kGather;
   bool unlit = false, error_map = false, quiet = false;
 };
@@ -147,6 +147,7 @@ class Solve {
                                       .sky = sky_,
                                       .no_sky = !sky_,
                                       .double_sided = options_.double_sided,
+                                      .adaptive = options_.adaptive,
                                       .method = options_.method};
     constexpr double kMillisecondsPerSecond = 1000.0;
     if (!call.no_time_limit)
@@ -347,6 +348,14 @@ void addSolve(CLI::App& app, Run& run) {
       ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("METRES")
       ->excludes(texels);
+  auto* adaptive = command.add_flag("--adaptive", options->adaptive,
+                                    "choose texels, as few as meet --error where people look, finer where light wants "
+                                    "it; --texels are the most there may be (then 1000000 unless it is named)");
+  adaptive->excludes("--texel-size");
+  command.parse_complete_callback([options, texels] {
+    constexpr std::uint64_t kMostTexels = 1'000'000;
+    if (options->adaptive && texels->count() == 0) options->texels = kMostTexels;
+  });
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
       ->type_name("N")
       ->capture_default_str();

@@ -88,6 +88,8 @@ struct SolveSettings {
   std::optional<double> time_limit_s;  ///< solve time
   std::uint64_t texels = 24'000;       ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
+  /// `texels` are the most there may be: as few are made, finer where light wants it, as meet the target at the surface.
+  bool adaptive = false;
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
   bool double_sided = false;      ///< all materials are, whatever the scene says
@@ -95,6 +97,7 @@ struct SolveSettings {
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 
   bool operator==(const SolveSettings&) const = default;
+  [[nodiscard]] bool choosesTexels() const { return adaptive && texel_size_m <= 0.0 && method != Method::kPaper; }
 };
 
 /// Warnings that a Status holds at most: it is made ten times a second, and scenes have as many as they have materials.

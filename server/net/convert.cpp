@@ -91,6 +91,7 @@ protocol::Settings toSettings(const engine::SolveSettings& s) {
     out.sky = {color(s.sky->upper), color(s.sky->lower)};
   }
   out.double_sided = s.double_sided;
+  out.adaptive = s.adaptive;
   out.method = s.method;
   return out;
 }
@@ -108,6 +109,7 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   if (call.no_sky) s.sky.reset();
   if (call.sky) s.sky = toSetting(*call.sky);
   if (call.double_sided) s.double_sided = *call.double_sided;
+  if (call.adaptive) s.adaptive = *call.adaptive;
   if (call.method) s.method = *call.method;
   return s;
 }

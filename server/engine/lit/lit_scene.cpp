@@ -18,6 +18,12 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
+/// Where the program chooses texels it looks at so many first, to so much of an error; and of the error asked for, whose
+/// square is that of both, so much may be the solver's and so much that of texels.
+constexpr std::uint64_t kPilotTexels = 16'000;
+constexpr double kPilotError = 0.03, kSolversPart = 0.6, kTexelsPart = 0.72;
+/// Texels are at most so many times as fine as those, or as coarse.
+constexpr float kMostDetail = 64.0F, kLeastDetail = 0.25F;
 
 std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
   std::uint64_t count = 0;
@@ -35,20 +41,30 @@ std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
 }  // namespace
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const SolveSettings& settings,
-                                                 solver::Transport& transport, const scene::ImportLimits& limits) {
+                                                 solver::Transport& transport, const scene::ImportLimits& limits,
+                                                 std::vector<float> detail) {
   auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
-  return make({std::move(document), std::move(*imported)}, settings, transport);
+  scene::EditedDocument edited{std::move(document), std::move(*imported)};
+  return build(std::move(edited), settings, transport, nullptr, std::move(detail));
 }
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, const SolveSettings& settings,
                                                  solver::Transport& transport, const LitScene* former) {
+  return build(std::move(edited), settings, transport, former, {});
+}
+
+Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, const SolveSettings& settings,
+                                                  solver::Transport& transport, const LitScene* former,
+                                                  std::vector<float> detail) {
   configureScene(edited.scene, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(edited), settings, transport));
   std::optional<scene::FormerScene> before;
   if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
   lit->reproducible_ = former == nullptr;
-  auto built = scene::buildWithRecord(*lit->scene_, lit->chartOptions(), before ? &*before : nullptr,
+  auto options = lit->chartOptions();
+  options.detail = std::move(detail);
+  auto built = scene::buildWithRecord(*lit->scene_, options, before ? &*before : nullptr,
                                       former != nullptr ? former->burial_.get() : nullptr);
   if (!built) return tl::unexpected<Error>(built.error());
   interruptionPoint(9, kMakeSteps);
@@ -58,12 +74,15 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
 
 Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, const SolveSettings& settings,
                                                       solver::Transport& transport, const scene::SideBits& sides,
+                                                      std::vector<float> detail,
                                                       const scene::ImportLimits& limits) {
   auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   configureScene(*imported, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene({std::move(document), std::move(*imported)}, settings, transport));
-  auto built = scene::buildAgain(*lit->scene_, lit->chartOptions(), sides);
+  auto options = lit->chartOptions();
+  options.detail = std::move(detail);
+  auto built = scene::buildAgain(*lit->scene_, options, sides);
   if (!built) return tl::unexpected<Error>(built.error());
   lit->take(std::move(*built));
   return lit;
@@ -71,16 +90,41 @@ Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, 
 
 scene::ChartOptions LitScene::chartOptions() const {
   scene::ChartOptions charts;
-  charts.texel_budget = settings_.texels;
+  charts.texel_budget = settings_.choosesTexels() ? std::min(settings_.texels, kPilotTexels) : settings_.texels;
   charts.texel_size_m = settings_.texel_size_m;
   charts.sky = skyOf(*scene_);
   return charts;
+}
+
+/// What is stated at the surface is of both, the solver's and that of texels. Where these are still to be chosen the
+/// light need not be known as well.
+double LitScene::solverTarget() const {
+  if (!settings_.choosesTexels()) return settings_.target_error;
+  const double target = kSolversPart * settings_.target_error;
+  return has_detail_ ? target : std::max(target, kPilotError);
+}
+
+std::vector<float> LitScene::detail() const {
+  std::vector<float> detail;
+  if (!has_detail_) return detail;
+  for (const auto& surface : patches_->surfaces) detail.push_back(surface.detail);
+  return detail;
+}
+
+solver::TexelDetail LitScene::wantedTexels() const {
+  const solver::DetailGoal goal{kTexelsPart * settings_.target_error, static_cast<double>(settings_.texels)};
+  auto wanted = solver::chooseDetail(*patches_, solver_->halfIrradiance(0), solver_->halfIrradiance(1),
+                                     surface_probe_.measured(), goal);
+  for (std::size_t s = 0; s < wanted.of_surface.size(); ++s)
+    wanted.of_surface[s] = std::clamp(wanted.of_surface[s] * patches_->surfaces[s].detail, kLeastDetail, kMostDetail);
+  return wanted;
 }
 
 void LitScene::take(scene::BuiltScene built) {
   patches_ = std::make_shared<const scene::PatchScene>(std::move(built.patches));
   burial_ = std::move(built.burial);
   normals_ = std::move(built.normals);
+  has_detail_ = std::ranges::any_of(patches_->surfaces, [](const auto& surface) { return surface.detail != 1.0F; });
   patch_count_ = leavesWithArea(*patches_);
   materials_ = scene::shadePatches(*scene_, *patches_);
   light_report_.findDark(litParts());
@@ -208,7 +252,7 @@ double LitScene::emittedPower() const {
 
 void LitScene::makeSolver(const solver::FormerSolver* former) {
   solver::SolverSettings settings;
-  settings.target_error = settings_.target_error;
+  settings.target_error = solverTarget();
   settings.seed = settings_.seed;
   settings.method = settings_.method;
   settings.link_memory = settings_.link_memory_bytes;

@@ -22,6 +22,7 @@
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
+#include "server/solver/surface/texel_detail.h"
 
 namespace radiosity::scene {
 class BurialRecord;
@@ -35,10 +36,12 @@ void configureScene(scene::Scene& scene, const SolveSettings& settings);
 
 class LitScene {
  public:
-  /// Imports and charts. The transport stays as it is until upload().
+  /// Imports and charts. The transport stays as it is until upload(). `detail`: of the texels of its surfaces, as
+  /// wantedTexels() tells; empty: all are alike.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
                                                               solver::Transport& transport,
-                                                              const scene::ImportLimits& limits = {});
+                                                              const scene::ImportLimits& limits = {},
+                                                              std::vector<float> detail = {});
   /// The same for a document that has been imported already. With a former scene that this one is an edit of, charts
   /// that the edit left alone stay as they are.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,
@@ -52,6 +55,7 @@ class LitScene {
                                                                    const SolveSettings& settings,
                                                                    solver::Transport& transport,
                                                                    const scene::SideBits& sides,
+                                                                   std::vector<float> detail,
                                                                    const scene::ImportLimits& limits = {});
 
   /// Whether makeAgain() gives the same charts, so that a saved solve fits them. One whose charts stayed where a former
@@ -59,6 +63,8 @@ class LitScene {
   [[nodiscard]] bool isReproducible() const { return reproducible_; }
   /// For makeAgain(). A pass over the surfaces.
   [[nodiscard]] scene::SideBits sides() const;
+  /// Likewise: empty where all texels are alike.
+  [[nodiscard]] std::vector<float> detail() const;
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
@@ -137,7 +143,7 @@ class LitScene {
   /// Another target or time limit: the solve goes on from where it is.
   void retarget(const SolveSettings& settings) {
     settings_ = settings;
-    solver_->setTargetError(settings.target_error);
+    solver_->setTargetError(solverTarget());
   }
 
   /// Finds out where light is lost, once a solve has come to its end: warnings() names it. Costs nothing where little
@@ -183,8 +189,16 @@ class LitScene {
   void forgetSurface() { surface_probe_.forget(); }
   /// Nothing: it is not measured.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
+  /// Where the program chooses texels: these are alike, and tell where others are to be finer.
+  [[nodiscard]] bool isPilot() const { return settings_.choosesTexels() && !has_detail_; }
+  /// Once surfaceError() is there: how fine texels should be for the target, by surface, as make() takes it.
+  [[nodiscard]] solver::TexelDetail wantedTexels() const;
 
  private:
+  [[nodiscard]] static Result<std::unique_ptr<LitScene>> build(scene::EditedDocument edited,
+                                                               const SolveSettings& settings,
+                                                               solver::Transport& transport, const LitScene* former,
+                                                               std::vector<float> detail);
   LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
       : document_(std::make_shared<const scene::Document>(std::move(edited.document))),
         settings_(settings),
@@ -219,6 +233,7 @@ class LitScene {
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
   [[nodiscard]] bool reachesDarkSides(const scene::Scene& next, const scene::Sky& sky) const;
   [[nodiscard]] scene::ChartOptions chartOptions() const;
+  [[nodiscard]] double solverTarget() const;
   /// What was built of scene_.
   void take(scene::BuiltScene built);
 
@@ -238,6 +253,7 @@ class LitScene {
   SurfaceProbe surface_probe_;
   bool stale_ = false;
   bool reproducible_ = true;
+  bool has_detail_ = false;  // texels are finer here than there
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                 // that the solver knows of

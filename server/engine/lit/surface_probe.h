@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/scene/lightmap/lightmap.h"
@@ -17,6 +18,7 @@ class SurfaceProbe {
   void forget() {
     measuring_.reset();
     stated_.reset();
+    measured_.clear();
   }
   /// Goes on for about `seconds`, from the beginning where there is none yet. `solved` is to stay as it is until
   /// forget(); `make_pages` makes what lookups are made in.
@@ -25,16 +27,20 @@ class SurfaceProbe {
     if (!measuring_) begin(solved, seed, make_pages());
     if (!measuring_->advance(seconds)) return;
     stated_ = measuring_->stated();
+    measured_ = measuring_->measured();
     measuring_.reset();
   }
   /// Nothing: it is not measured yet.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& stated() const { return stated_; }
+  /// Place by place, what that was found by.
+  [[nodiscard]] std::span<const solver::SurfaceError::Measured> measured() const { return measured_; }
 
  private:
   void begin(const solver::SolvedScene& solved, std::uint64_t seed, const std::vector<scene::LightmapPage>& pages);
 
   std::unique_ptr<solver::SurfaceError> measuring_;
   std::optional<solver::SurfaceErrorParts> stated_;
+  std::vector<solver::SurfaceError::Measured> measured_;
 };
 
 }  // namespace radiosity::engine

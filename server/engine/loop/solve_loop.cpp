@@ -101,6 +101,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     takeTurn();
   }
   checkpoints_.reset();
+  refinement_.reset();
   load_.reset();
   former_load_.reset();
   settling_.reset();
@@ -131,7 +132,9 @@ bool SolveLoop::runCommands() {
 }
 
 bool SolveLoop::hasNothingToDo() const {
-  return first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind() && !probesSurface();
+  if (first_light_) return !first_light_->goes_on;
+  if (state_ == SolveState::kSolving) return refinement_ && refinement_->job && !refinement_->job->isDone();
+  return !isBehind() && !probesSurface();
 }
 
 void SolveLoop::runCommand(const CommandQueue::Command& command) {
@@ -152,6 +155,8 @@ void SolveLoop::takeTurn() {
     if (settling_) return checkpointIfDue();
     if (first_light_)
       firstLightSlice();
+    else if (state_ == SolveState::kSolving && refinement_)
+      refineSlice();
     else if (state_ == SolveState::kSolving)
       solveSlice();
     else if (isBehind())
@@ -213,7 +218,11 @@ void SolveLoop::solveSlice() {
     return tellProgress(false);
   }
   unpublished_ = true;
-  if (*outcome == solver::StepOutcome::kConverged) {
+  const bool has_ended = *outcome == solver::StepOutcome::kConverged || *outcome == solver::StepOutcome::kExhausted;
+  if (has_ended && mayRefine() && !lit_->solver().isBehind()) {
+    const bool converged = *outcome == solver::StepOutcome::kConverged;
+    beginRefinement(converged ? SolveState::kConverged : SolveState::kLimited);
+  } else if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
   } else if (*outcome == solver::StepOutcome::kExhausted) {
     failure_ = limitText(lit_->solver().limit(), settings_.link_memory_bytes);
@@ -231,6 +240,7 @@ Result<solver::StepOutcome> SolveLoop::stepSolver() {
   stepped_ = true;
   ++steps_;
   step_began_ = Clock::now();
+  lit_->forgetSurface();
   return lit_->solver().step();
 }
 
@@ -284,6 +294,8 @@ void SolveLoop::tellProgress(bool assess) {
 void SolveLoop::beginSolve() {
   seconds_ = 0.0;
   failure_.clear();
+  refinement_.reset();
+  refined_times_ = 0;
   if (state_ != SolveState::kPaused) state_ = SolveState::kSolving;
   unpublished_ = true;
   updateStatus(true);
@@ -299,7 +311,6 @@ void SolveLoop::endSolve(SolveState state) {
     if (state != SolveState::kFailed) lit_->endFade();
     if (state != SolveState::kFailed) tellLostLight();
   }
-  if (lit_) lit_->forgetSurface();
   const bool reported = publishLightmaps(true);
   updateStatus(true, reported);
   disposer_.dispose(std::exchange(retired_, nullptr));

@@ -1,7 +1,7 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in eight files: solve_loop.cpp
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in nine files: solve_loop.cpp
 // runs the thread, solve_loop_load.cpp takes in scenes, solve_loop_edits.cpp changes scene and settings,
 // solve_loop_answers.cpp makes what can be fetched, solve_loop_publish.cpp shows lightmaps to those who watch,
-// solve_loop_state.cpp keeps what outlives the process, solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp
+// solve_loop_refine.cpp chooses texels, solve_loop_state.cpp keeps what outlives the process, solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp
 // goes on when renderers are lost.
 #pragma once
 
@@ -29,6 +29,7 @@
 #include "server/engine/loop/listeners.h"
 #include "server/engine/loop/load_job.h"
 #include "server/engine/loop/long_work.h"
+#include "server/engine/loop/refine_job.h"
 #include "server/engine/loop/solve_loop.h"
 #include "server/engine/loop/upkeep.h"
 #include "server/engine/loop/watches.h"
@@ -126,6 +127,18 @@ class SolveLoop final : public Engine {
   /// Solved; what people see of its error is still to be measured.
   [[nodiscard]] bool probesSurface() const;
   void probeSurface();
+  /// Where the program chooses texels: what a solve on those that there are has come to is measured, and others take
+  /// their place. `otherwise`: how the solve ends where none do.
+  struct Refinement {
+    SolveState otherwise;
+    std::unique_ptr<RefineJob> job;  ///< null: it is still being measured
+    Clock::time_point ordered{};
+  };
+  [[nodiscard]] bool mayRefine() const;
+  void beginRefinement(SolveState otherwise);
+  void refineSlice();
+  void orderRefined();
+  void takeRefined();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
@@ -301,6 +314,8 @@ class SolveLoop final : public Engine {
   Clock::time_point retry_at_{};
   std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
   Upkeep upkeep_;
+  std::optional<Refinement> refinement_;  // of the solve under way
+  int refined_times_ = 0;                 // since the scene was loaded or edited
   std::size_t lost_told_ = 0;  // warnings of lost light that were logged since the load: edits log no others
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both

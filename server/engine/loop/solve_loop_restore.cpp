@@ -172,7 +172,7 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   if (then.gltf.is_discarded()) return fail(ErrorCode::kBadInput, "its document is no JSON");
   auto settings = settings_;
   settings.target_error = head.target_error;
-  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, limits_);
+  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, head.detail, limits_);
   if (!lit) return lit;
   (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");

@@ -21,6 +21,7 @@ CheckpointHead headOf(const SolveSettings& settings) {
   head.target_error = settings.target_error;
   head.method = settings.method;
   head.double_sided = settings.double_sided;
+  head.adaptive = settings.choosesTexels();
   head.has_sky = settings.sky.has_value();
   head.sky = settings.sky.value_or(SkySetting{});
   return head;
@@ -29,7 +30,7 @@ CheckpointHead headOf(const SolveSettings& settings) {
 bool sameSolve(const CheckpointHead& a, const CheckpointHead& b) {
   const auto key = [](const CheckpointHead& h) {
     return std::tuple(h.texel_size_m, h.texel_size_m > 0.0 ? 0 : h.texels, h.seed, h.link_memory, h.method, h.has_sky,
-                      h.double_sided);
+                      h.double_sided, h.adaptive);
   };
   return key(a) == key(b) && a.sky == b.sky;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "server/engine/engine.h"
 #include "server/scene/document/document.h"
@@ -21,15 +22,16 @@ struct CheckpointHead {
   std::uint64_t texels = 0, seed = 0, link_memory = 0;
   double texel_size_m = 0.0, target_error = 0.0, seconds = 0.0;
   Method method = Method::kGather;
-  bool has_sky = false, double_sided = false;
+  bool has_sky = false, double_sided = false, adaptive = false;
   SkySetting sky;
   std::string gltf, assets;  ///< JSON, and a digest of buffers and images
   scene::SideBits sides;     ///< LitScene::sides()
+  std::vector<float> detail;  ///< LitScene::detail()
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
-            self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets, self.sides);
+            self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.adaptive, self.gltf, self.assets, self.sides, self.detail);
   }
 };
 

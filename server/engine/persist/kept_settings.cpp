@@ -37,6 +37,7 @@ std::map<std::string, std::string> keptSettings(const SolveSettings& settings) {
   std::map<std::string, std::string> kept = {{"targetError", fmt::format("{}", settings.target_error)},
                                              {"timeLimit", fmt::format("{}", settings.time_limit_s.value_or(0.0))},
                                              {"texels", fmt::format("{}", settings.texels)},
+                                             {"adaptive", settings.adaptive ? "1" : "0"},
                                              {"texelSize", fmt::format("{}", settings.texel_size_m)},
                                              {"seed", fmt::format("{}", settings.seed)},
                                              {"sky", ""},
@@ -62,6 +63,7 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
   }
   if (!named.contains("texels")) {
     if (const auto texels = whole("texels"); texels && *texels > 0) settings.texels = *texels;
+    settings.adaptive = whole("adaptive").value_or(settings.adaptive ? 1 : 0) == 1;
     if (const auto size = real("texelSize"); size && *size >= 0.0 && std::isfinite(*size))
       settings.texel_size_m = *size;
   }

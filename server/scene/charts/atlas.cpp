@@ -183,7 +183,7 @@ class LayoutMaker {
 
   /// The budget is shared out as if all scales were 1: one object's scale leaves the others as they are.
   [[nodiscard]] double texelOf(const Chart& chart) const {
-    return texel_ / static_cast<double>(scene_.instances[chart.instance].texel_scale);
+    return texel_ / static_cast<double>(scene_.instances[chart.instance].texel_scale) / chart.detail;
   }
 
   void addChart(std::uint32_t c) {

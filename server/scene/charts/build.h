@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "common/result.h"
 #include "server/scene/burial/burial_record.h"
@@ -21,6 +22,9 @@ struct ChartOptions {
   std::uint32_t gutter = 2;       ///< empty texels between charts
   Sky sky;                        ///< of a scene that names none
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
+  /// By surface of the same scene, built with the same other options: how many times as fine as others its texels are
+  /// (Surface::detail). Empty: all are alike. It adds to the budget, or takes from it.
+  std::vector<float> detail;
 };
 
 /// A scene as it was before an edit. Refers to its parts.

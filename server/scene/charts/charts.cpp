@@ -65,6 +65,7 @@ class Builder {
       if (ratio > kCoarsest || ratio < 1.0 / kCoarsest) return std::nullopt;
       patches_.texel = former_->patches.texel;
     }
+    shareDetail();
     interruptionPoint(2, kBuildSteps);
     auto atlas = layOut(scene_, charts_, patches_.texel, options_, formerPlaces());
     if (!atlas) return tl::unexpected(atlas.error());
@@ -263,6 +264,24 @@ class Builder {
     return former;
   }
 
+  /// What an edit left alone keeps the texels that it has. Islands of a layout that is kept come nearer to each other
+  /// with coarser ones, so that none get those.
+  void shareDetail() {
+    const auto former = formerSurfaces();
+    const bool given = former_ == nullptr && options_.detail.size() == charts_.size();
+    for (std::size_t c = 0; c < charts_.size(); ++c) {
+      if (former[c] != nullptr) charts_[c].detail = static_cast<double>(former[c]->detail);
+      if (given) charts_[c].detail = static_cast<double>(options_.detail[c]);
+    }
+    for (std::size_t first = 0, end = 0; first < charts_.size(); first = end) {
+      double finest = 1.0;
+      for (; end < charts_.size() && charts_[end].instance == charts_[first].instance; ++end)
+        if (charts_[end].from_file) finest = std::max(finest, charts_[end].detail);
+      for (auto c = first; c < end; ++c)
+        if (charts_[c].from_file) charts_[c].detail = finest;
+    }
+  }
+
   [[nodiscard]] FormerPlaces formerPlaces() const {
     FormerPlaces places;
     if (former_ == nullptr) return places;
@@ -286,6 +305,7 @@ class Builder {
     surface.height = grid.height;
     surface.level_count = levelCount(grid.width, grid.height);
     surface.place = grid.place;
+    surface.detail = static_cast<float>(chart.detail);
     surface.flipped = chart.flipped;
     surface.shows_back = chart.shows_back;
     surface.first_triangle = static_cast<std::uint32_t>(patches_.triangles.size());

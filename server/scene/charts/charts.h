@@ -54,7 +54,8 @@ struct Chart {
   bool flipped = false;                              ///< Surface::flipped
   bool back_lit = false;                             ///< the back has patches, too
   bool shows_back = false;                           ///< Surface::shows_back
-  bool dark = false;  ///< no light reaches either side: one texel is enough (isLeftCoarse)
+  double detail = 1.0;  ///< Surface::detail; the same of all charts of an instance that keep their layout
+  bool dark = false;    ///< no light reaches either side: one texel is enough (isLeftCoarse)
 };
 
 /// Facet (coplanar connected triangles of one instance) of each triangle.

@@ -84,6 +84,7 @@ struct Surface {
   std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
   std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
   float texel_area = 0.0F;          ///< area of a full leaf, unit box squared
+  float detail = 1.0F;              ///< its texels are about so many times as fine as PatchScene::texel
 };
 
 struct Page {

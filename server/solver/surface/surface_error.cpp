@@ -32,6 +32,7 @@ SurfaceError::SurfaceError(PlaceLight light, std::uint64_t seed, std::size_t pla
       up_to.push_back(area += light_.rays().areaOf(side.first_value + leaf));
   }
   if (area <= 0.0) return;
+  area_ = area;
   for (std::uint32_t i = 0; i < places; ++i) {  // one of each stretch
     const auto at = sobol4(i, seed_);
     const double where = (static_cast<double>(i) + uniformFromKey(mixKeys(seed_, i))) / static_cast<double>(places);
@@ -65,6 +66,16 @@ bool SurfaceError::advance(double seconds) {
     if (spent() >= seconds) break;
   }
   return done_ == spots_.size();
+}
+
+std::vector<SurfaceError::Measured> SurfaceError::measured() const {
+  std::vector<Measured> all;
+  for (std::size_t i = 0; i < spots_.size(); ++i) {
+    const glm::dvec3 found(found_[i]);
+    all.push_back({light_.rays().sideOf(spots_[i].place.value).surface,
+                   glm::dot(found - true_[i][0], found - true_[i][1]), area_ / static_cast<double>(spots_.size())});
+  }
+  return all;
 }
 
 /// The estimates are independent, so that their noise cancels in the product of what a lookup differs from either by.

@@ -41,6 +41,13 @@ class SurfaceError {
   /// Goes on for about `seconds`, on all cores. True: it is done. Where the cuts lie changes no bit. Cost: PlaceLight,
   /// twice a place; a quarter of a second on two cores in a room of a thousand triangles.
   [[nodiscard]] bool advance(double seconds);
+  /// When it is done: what was found at each place, in the order of lookups().
+  struct Measured {
+    std::uint32_t surface = 0;
+    double square = 0.0;  ///< of what the lookup is off by, all channels, lux^2: below zero by chance
+    double area = 0.0;    ///< that the place stands for, unit box squared
+  };
+  [[nodiscard]] std::vector<Measured> measured() const;
   /// When it is done; all zero where there is no light.
   [[nodiscard]] SurfaceErrorParts stated() const;
 
@@ -51,6 +58,7 @@ class SurfaceError {
   std::vector<glm::vec3> found_;
   std::vector<std::array<glm::dvec3, 2>> true_;  ///< two independent estimates, by place
   std::size_t done_ = 0;
+  double area_ = 0.0;  ///< of all that has texels
 };
 
 }  // namespace radiosity::solver

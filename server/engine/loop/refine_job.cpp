@@ -1,0 +1,46 @@
+#include "server/engine/loop/refine_job.h"
+
+#include <pthread.h>
+
+#include <utility>
+
+#include "server/engine/lit/memory.h"
+
+namespace radiosity::engine {
+
+RefineJob::RefineJob(Order order, solver::Transport& transport, std::function<void()> wake)
+    : order_(std::move(order)), transport_(transport), wake_(std::move(wake)), thread_([this] { run(); }) {
+  (void)pthread_setname_np(thread_.native_handle(), "refine");
+}
+
+RefineJob::~RefineJob() {
+  task_.cancel();
+  thread_.join();
+}
+
+void RefineJob::run() {
+  auto made = unlessCancelled(task_, [&]() -> Made {
+    auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, std::move(order_.detail));
+    if (!lit) return lit;
+    (void)(*lit)->startSolve();  // all that the solve thread need not do
+    (*lit)->prepareUpload();
+    return lit;
+  });
+  {
+    const std::scoped_lock lock(mutex_);
+    made_ = std::move(made);
+  }
+  wake_();
+}
+
+std::optional<RefineJob::Made> RefineJob::take() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(made_, std::nullopt);
+}
+
+bool RefineJob::isDone() const {
+  const std::scoped_lock lock(mutex_);
+  return made_.has_value();
+}
+
+}  // namespace radiosity::engine

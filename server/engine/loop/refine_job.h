@@ -1,0 +1,52 @@
+// Lays a scene out anew with finer texels where its light wants them, on a thread of its own, while the layout before
+// is shown and edited. The solve thread owns the job; one that goes is called off, and its end is waited for.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "common/result.h"
+#include "common/task.h"
+#include "server/engine/engine.h"
+#include "server/engine/lit/lit_scene.h"
+#include "server/scene/document/document.h"
+
+namespace radiosity::engine {
+
+class RefineJob {
+ public:
+  struct Order {
+    std::shared_ptr<const scene::Document> document;
+    SolveSettings settings;
+    scene::ImportLimits limits;
+    std::vector<float> detail;  ///< scene::ChartOptions::detail
+  };
+  using Made = Result<std::unique_ptr<LitScene>>;
+
+  /// `wake`, which does not throw, is called from another thread when take() has something. Throws std::system_error.
+  RefineJob(Order order, solver::Transport& transport, std::function<void()> wake);
+  ~RefineJob();
+  RefineJob(const RefineJob&) = delete;
+  RefineJob& operator=(const RefineJob&) = delete;
+
+  /// Nothing: it is not done yet. Once.
+  [[nodiscard]] std::optional<Made> take();
+  [[nodiscard]] bool isDone() const;
+
+ private:
+  void run();
+
+  Order order_;
+  solver::Transport& transport_;
+  std::function<void()> wake_;
+  Task task_;
+  mutable std::mutex mutex_;
+  std::optional<Made> made_;
+  std::thread thread_;
+};
+
+}  // namespace radiosity::engine
