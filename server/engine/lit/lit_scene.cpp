@@ -21,9 +21,11 @@ constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
 /// Where the program chooses texels it looks at so many first, to so much of an error; and of the error asked for, whose
 /// square is that of both, so much may be the solver's and so much that of texels.
 constexpr std::uint64_t kPilotTexels = 16'000;
-constexpr double kPilotError = 0.03, kSolversPart = 0.6, kTexelsPart = 0.72;
+constexpr double kPilotError = 0.03, kSolversPart = 0.5, kTexelsPart = 0.82;
+/// One layout has at most so many times as many texels as the one before, which tells too little of more.
+constexpr double kMostGrowth = 8.0;
 /// Texels are at most so many times as fine as those, or as coarse.
-constexpr float kMostDetail = 64.0F, kLeastDetail = 0.25F;
+constexpr float kMostDetail = 64.0F, kLeastDetail = 0.5F;
 
 std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
   std::uint64_t count = 0;
@@ -100,8 +102,7 @@ scene::ChartOptions LitScene::chartOptions() const {
 /// light need not be known as well.
 double LitScene::solverTarget() const {
   if (!settings_.choosesTexels()) return settings_.target_error;
-  const double target = kSolversPart * settings_.target_error;
-  return has_detail_ ? target : std::max(target, kPilotError);
+  return kSolversPart * std::max(settings_.target_error, draft_error_);
 }
 
 std::vector<float> LitScene::detail() const {
@@ -112,7 +113,8 @@ std::vector<float> LitScene::detail() const {
 }
 
 solver::TexelDetail LitScene::wantedTexels() const {
-  const solver::DetailGoal goal{kTexelsPart * settings_.target_error, static_cast<double>(settings_.texels)};
+  const double most = std::min(static_cast<double>(settings_.texels), kMostGrowth * static_cast<double>(patch_count_));
+  const solver::DetailGoal goal{kTexelsPart * settings_.target_error, most};
   auto wanted = solver::chooseDetail(*patches_, solver_->halfIrradiance(0), solver_->halfIrradiance(1),
                                      surface_probe_.measured(), goal);
   for (std::size_t s = 0; s < wanted.of_surface.size(); ++s)
@@ -125,6 +127,7 @@ void LitScene::take(scene::BuiltScene built) {
   burial_ = std::move(built.burial);
   normals_ = std::move(built.normals);
   has_detail_ = std::ranges::any_of(patches_->surfaces, [](const auto& surface) { return surface.detail != 1.0F; });
+  if (settings_.choosesTexels() && !has_detail_) draft_error_ = kPilotError / kSolversPart;
   patch_count_ = leavesWithArea(*patches_);
   materials_ = scene::shadePatches(*scene_, *patches_);
   light_report_.findDark(litParts());

@@ -189,8 +189,10 @@ class LitScene {
   void forgetSurface() { surface_probe_.forget(); }
   /// Nothing: it is not measured.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
-  /// Where the program chooses texels: these are alike, and tell where others are to be finer.
-  [[nodiscard]] bool isPilot() const { return settings_.choosesTexels() && !has_detail_; }
+  /// Where the program chooses texels: these are not enough, and tell where others are to be finer. Before startSolve().
+  /// `error`: that is likely to be left by texels; light need not be known much better.
+  void setDraft(double error) { draft_error_ = error; }
+  [[nodiscard]] bool isDraft() const { return draft_error_ > 0.0; }
   /// Once surfaceError() is there: how fine texels should be for the target, by surface, as make() takes it.
   [[nodiscard]] solver::TexelDetail wantedTexels() const;
 
@@ -254,6 +256,7 @@ class LitScene {
   bool stale_ = false;
   bool reproducible_ = true;
   bool has_detail_ = false;  // texels are finer here than there
+  double draft_error_ = 0.0;  // and these are to be replaced; 0: they are not
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                 // that the solver knows of

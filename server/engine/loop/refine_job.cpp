@@ -22,6 +22,7 @@ void RefineJob::run() {
   auto made = unlessCancelled(task_, [&]() -> Made {
     auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, std::move(order_.detail));
     if (!lit) return lit;
+    if (order_.draft_error > 0.0) (*lit)->setDraft(order_.draft_error);
     (void)(*lit)->startSolve();  // all that the solve thread need not do
     (*lit)->prepareUpload();
     return lit;

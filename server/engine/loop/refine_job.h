@@ -24,6 +24,7 @@ class RefineJob {
     SolveSettings settings;
     scene::ImportLimits limits;
     std::vector<float> detail;  ///< scene::ChartOptions::detail
+    double draft_error = 0.0;   ///< LitScene::setDraft(); 0: it is none
   };
   using Made = Result<std::unique_ptr<LitScene>>;
 

@@ -17,6 +17,8 @@ namespace {
 constexpr int kMostRounds = 4;
 /// Of measuring what people see, between two looks at what else there is to do.
 constexpr double kProbeSeconds = 0.02;
+/// With more of the texels that there may be than this there is no other layout to come.
+constexpr double kNearlyAll = 0.8;
 /// Another layout is worth it where it is to have so many times as many texels.
 constexpr double kWorthwhile = 1.05;
 
@@ -47,21 +49,24 @@ void SolveLoop::refineSlice() {
 /// Ends the solve where that has what was asked for, or can have no more of it.
 void SolveLoop::orderRefined() {
   const auto otherwise = refinement_->otherwise;
-  const bool is_first = lit_->isPilot();
-  if (lit_->surfaceError()->total <= settings_.target_error && !is_first) {
+  const bool is_draft = lit_->isDraft();
+  if (lit_->surfaceError()->total <= settings_.target_error && !is_draft) {
     refinement_.reset();
     return endSolve(SolveState::kConverged);
   }
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
-  if (!is_first && wanted.texels < kWorthwhile * texels) {
+  if (!is_draft && wanted.texels < kWorthwhile * texels) {
     refinement_.reset();
     failure_ = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
                            settings_.texels, 100.0 * lit_->surfaceError()->total);
     return endSolve(otherwise == SolveState::kConverged ? SolveState::kLimited : otherwise);
   }
   try {
-    RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.of_surface)};
+    const bool suffices = wanted.error <= settings_.target_error ||
+                          wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
+    RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.of_surface),
+                              suffices ? 0.0 : wanted.error};
     refinement_->job = std::make_unique<RefineJob>(std::move(order), *transport_, [this] { queue_.wake(); });
     refinement_->ordered = Clock::now();
   } catch (const std::system_error& error) {

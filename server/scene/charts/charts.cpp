@@ -274,11 +274,15 @@ class Builder {
       if (given) charts_[c].detail = static_cast<double>(options_.detail[c]);
     }
     for (std::size_t first = 0, end = 0; first < charts_.size(); first = end) {
-      double finest = 1.0;
-      for (; end < charts_.size() && charts_[end].instance == charts_[first].instance; ++end)
-        if (charts_[end].from_file) finest = std::max(finest, charts_[end].detail);
+      double texels = 0.0, area = 0.0;  // as many in all as if each had its own
+      for (; end < charts_.size() && charts_[end].instance == charts_[first].instance; ++end) {
+        if (!charts_[end].from_file) continue;
+        texels += charts_[end].area * charts_[end].detail * charts_[end].detail;
+        area += charts_[end].area;
+      }
+      const double shared = area > 0.0 ? std::max(1.0, std::sqrt(texels / area)) : 1.0;
       for (auto c = first; c < end; ++c)
-        if (charts_[c].from_file) charts_[c].detail = finest;
+        if (charts_[c].from_file) charts_[c].detail = shared;
     }
   }
 

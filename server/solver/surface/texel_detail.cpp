@@ -17,6 +17,8 @@ constexpr double kEven = 0.003, kEdge = 0.08;
 constexpr double kEvenPower = 4.0, kEdgePower = 1.0;
 /// One round makes texels at most so many times as fine, or as coarse: what they hide is known no better.
 constexpr double kFinest = 8.0, kCoarsest = 0.5;
+/// With fewer of them nothing would be known of what coarser ones hide.
+constexpr double kFewTexels = 64.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
 constexpr double kLeastOwn = 0.1;
 
@@ -206,13 +208,20 @@ class DetailChooser {
   /// `gain`: a texel more is worth what lowers the error by one in so many.
   [[nodiscard]] static double detailAt(const Need& need, double gain) {
     if (need.texels <= 0.0) return 1.0;
-    return std::clamp(std::pow(gain * need.power * need.error / need.texels, 1.0 / (need.power + 2.0)), kCoarsest, kFinest);
+    const double coarsest = need.texels >= kFewTexels ? kCoarsest : 1.0;
+    const auto with = [&](double power) { return std::pow(gain * power * need.error / need.texels, 1.0 / (power + 2.0)); };
+    const double finer = with(need.power);
+    return finer >= 1.0 ? std::min(finer, kFinest) : std::clamp(with(kEvenPower), coarsest, 1.0);
+  }
+  /// Coarser texels begin to hide what these still show.
+  [[nodiscard]] static double errorAt(const Need& need, double detail) {
+    return need.error * std::pow(detail, detail < 1.0 ? -kEvenPower : -need.power);
   }
   [[nodiscard]] Sums sumsAt(double gain) const {
     Sums sums;
     for (const auto& need : needs_) {
       const double detail = detailAt(need, gain);
-      sums.error += need.error * std::pow(detail, -need.power);
+      sums.error += errorAt(need, detail);
       sums.texels += need.texels > 0.0 ? std::max(1.0, need.texels * detail * detail) : 0.0;
     }
     return sums;
