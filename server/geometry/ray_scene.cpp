@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "server/geometry/same_triangles.h"
+
 namespace radiosity::geometry {
 namespace {
 
@@ -29,10 +31,25 @@ struct SceneDeleter {
 using Device = std::unique_ptr<RTCDeviceTy, DeviceDeleter>;
 using Scene = std::unique_ptr<RTCSceneTy, SceneDeleter>;
 
+/// Which triangles stand in the tree.
+struct Numbers {
+  /// By geometry, what its triangles are numbered; empty: as they are.
+  std::array<std::vector<std::uint32_t>, 2> triangle_of;
+  /// By triangle, the next one with the same corners, which is not in the tree, or kNoTriangle. Empty: there are none.
+  std::vector<std::uint32_t> next_same;
+
+  [[nodiscard]] std::uint32_t of(std::uint32_t geometry, std::uint32_t primitive) const {
+    return triangle_of[geometry].empty() ? primitive : triangle_of[geometry][primitive];
+  }
+  [[nodiscard]] std::uint32_t after(std::uint32_t triangle) const {
+    return next_same.empty() ? kNoTriangle : next_same[triangle];
+  }
+};
+
 /// What the rays of one question go by, and what they met so far. Embree hands it to the filters below.
 struct Nearest {
   RTCIntersectContext context;  // first: Embree's pointer to it is a pointer to this
-  const std::array<std::vector<std::uint32_t>, 2>* triangle_of = nullptr;
+  const Numbers* numbers = nullptr;
   std::array<std::uint32_t, kPacket> own;
   std::span<const std::uint32_t> passed;
   std::array<Hit, kPacket> hit;
@@ -40,15 +57,10 @@ struct Nearest {
 
 struct Open {
   RTCIntersectContext context;  // first, as above
-  const std::array<std::vector<std::uint32_t>, 2>* triangle_of = nullptr;
+  const Numbers* numbers = nullptr;
   const SeeThrough* passes = nullptr;
   const std::uint64_t* key = nullptr;
 };
-
-std::uint32_t numberOf(const std::array<std::vector<std::uint32_t>, 2>& triangle_of, std::uint32_t geometry,
-                       std::uint32_t primitive) {
-  return triangle_of[geometry].empty() ? primitive : triangle_of[geometry][primitive];
-}
 
 /// Takes a hit that is nearer than the one before, or coincides with that and goes before it; and has Embree look on
 /// for what coincides with it.
@@ -58,14 +70,17 @@ void takeNearest(const RTCFilterFunctionNArguments* arguments) {
   for (unsigned lane = 0; lane < count; ++lane) {
     if (arguments->valid[lane] != -1) continue;
     const auto ray = RTCRayN_id(arguments->ray, count, lane);
-    const auto triangle = numberOf(*asked.triangle_of, RTCHitN_geomID(arguments->hit, count, lane),
-                                   RTCHitN_primID(arguments->hit, count, lane));
+    auto triangle =
+        asked.numbers->of(RTCHitN_geomID(arguments->hit, count, lane), RTCHitN_primID(arguments->hit, count, lane));
     float& far = RTCRayN_tfar(arguments->ray, count, lane);
     const float t = far;
     auto& best = asked.hit[ray];
     const auto isPassed = [&] {
       return triangle == asked.own[ray] || std::ranges::find(asked.passed, triangle) != asked.passed.end();
     };
+    for (auto next = asked.numbers->after(triangle); next != kNoTriangle && isPassed();
+         next = asked.numbers->after(triangle))
+      triangle = next;
     const bool front = RTCHitN_Ng_x(arguments->hit, count, lane) * RTCRayN_dir_x(arguments->ray, count, lane) +
                            RTCHitN_Ng_y(arguments->hit, count, lane) * RTCRayN_dir_y(arguments->ray, count, lane) +
                            RTCHitN_Ng_z(arguments->hit, count, lane) * RTCRayN_dir_z(arguments->ray, count, lane) <
@@ -100,11 +115,12 @@ void passThrough(const RTCFilterFunctionNArguments* arguments) {
   const auto count = arguments->N;
   for (unsigned lane = 0; lane < count; ++lane) {
     if (arguments->valid[lane] != -1) continue;
-    const auto triangle = numberOf(*asked.triangle_of, RTCHitN_geomID(arguments->hit, count, lane),
-                                   RTCHitN_primID(arguments->hit, count, lane));
+    auto triangle =
+        asked.numbers->of(RTCHitN_geomID(arguments->hit, count, lane), RTCHitN_primID(arguments->hit, count, lane));
     const float u = RTCHitN_u(arguments->hit, count, lane), v = RTCHitN_v(arguments->hit, count, lane);
-    const bool passes = asked.key == nullptr ||
-                        asked.passes->passes(triangle, u, v, asked.key[RTCRayN_id(arguments->ray, count, lane)]);
+    bool passes = true;
+    for (; asked.key != nullptr && passes && triangle != kNoTriangle; triangle = asked.numbers->after(triangle))
+      passes = asked.passes->passes(triangle, u, v, asked.key[RTCRayN_id(arguments->ray, count, lane)]);
     if (passes) arguments->valid[lane] = 0;
   }
 }
@@ -149,6 +165,18 @@ bool attach(RTCDevice device, RTCScene scene, std::span<const Triangle> triangle
   return room;
 }
 
+/// Of triangles with the same corners the first alone is to be in the tree: a ray that meets one meets all, and would
+/// ask each of them. False: all are, by their numbers, and all are of the first kind.
+bool numberAll(std::span<const Triangle> triangles, const std::vector<bool>& see_through, Numbers& numbers) {
+  auto same = findSame(triangles, see_through);
+  const bool mixed = std::ranges::find(see_through, true) != see_through.end() || !same.next.empty();
+  for (std::uint32_t i = 0; mixed && i < triangles.size(); ++i) {
+    if (same.isFirst(i)) numbers.triangle_of[!see_through.empty() && see_through[i] ? 1 : 0].push_back(i);
+  }
+  numbers.next_same = std::move(same.next);
+  return mixed;
+}
+
 Error errorOf(RTCDevice device) {
   const auto error = rtcGetDeviceError(device);
   if (error == RTC_ERROR_OUT_OF_MEMORY) return {ErrorCode::kTooLarge, "there is no memory for the tree of triangles"};
@@ -160,8 +188,7 @@ Error errorOf(RTCDevice device) {
 struct RayScene::Tree {
   Device device;
   Scene scene;
-  /// By geometry, what its triangles are numbered; empty: as they are.
-  std::array<std::vector<std::uint32_t>, 2> triangle_of;
+  Numbers numbers;
   std::shared_ptr<const SeeThrough> passes;
 };
 
@@ -178,11 +205,10 @@ Result<RayScene> RayScene::build(std::span<const Triangle> triangles, unsigned t
   if (!tree->scene) return tl::unexpected(errorOf(device));
   rtcSetSceneFlags(tree->scene.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(tree->scene.get(), RTC_BUILD_QUALITY_MEDIUM);
-  const bool mixed = std::ranges::find(see_through, true) != see_through.end();
-  for (std::uint32_t i = 0; mixed && i < triangles.size(); ++i) tree->triangle_of[see_through[i] ? 1 : 0].push_back(i);
+  const bool mixed = numberAll(triangles, see_through, tree->numbers);
   tree->passes = std::move(passes);
   for (std::size_t kind = 0; kind < 2; ++kind) {
-    const auto& numbers = tree->triangle_of[kind];
+    const auto& numbers = tree->numbers.triangle_of[kind];
     const auto count = mixed ? numbers.size() : kind == 0 ? triangles.size() : 0;
     if (count > 0 && !attach(device, tree->scene.get(), triangles, numbers, count, kind == 1))
       return tl::unexpected(errorOf(device));
@@ -200,7 +226,7 @@ Hit RayScene::nearest(const Ray& ray, std::span<const std::uint32_t> passed) con
   if (!tree_) return {};
   Nearest asked;
   rtcInitIntersectContext(&asked.context);
-  asked.triangle_of = &tree_->triangle_of;
+  asked.numbers = &tree_->numbers;
   asked.own[0] = ray.own;
   asked.passed = passed;
   asked.hit[0] = {};
@@ -220,7 +246,7 @@ void RayScene::nearest(std::span<const Ray> rays, std::span<Hit> hits) const {
   Nearest asked;
   rtcInitIntersectContext(&asked.context);
   asked.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  asked.triangle_of = &tree_->triangle_of;
+  asked.numbers = &tree_->numbers;
   alignas(32) std::array<int, kPacket> valid{};
   RTCRayHit8 query;
   for (unsigned i = 0; i < kPacket; ++i) {
@@ -250,7 +276,7 @@ bool RayScene::open(const Ray& ray) const {
   if (!tree_) return true;
   Open asked;
   rtcInitIntersectContext(&asked.context);
-  asked.triangle_of = &tree_->triangle_of;
+  asked.numbers = &tree_->numbers;
   auto query = queryOf(ray);
   rtcOccluded1(tree_->scene.get(), &asked.context, &query);
   return query.tfar >= 0.0F;
@@ -262,7 +288,7 @@ std::uint32_t RayScene::open(const Ways& ways, std::size_t count) const {
   Open asked;
   rtcInitIntersectContext(&asked.context);
   asked.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  asked.triangle_of = &tree_->triangle_of;
+  asked.numbers = &tree_->numbers;
   asked.passes = tree_->passes.get();
   asked.key = ways.key.data();
   alignas(32) std::array<int, kPacket> valid{};

@@ -105,13 +105,26 @@ def leaning_tubes(count=10_000):
     return scene.glb()
 
 
-def _png(side):
-    """One channel, all of one value."""
+CHANNELS = {0: 1, 6: 4}
+
+
+def _png_of(data, side, colour, depth=8):
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-    rows = zlib.compress((b"\0" + b"\x80" * side) * side, 9)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", side, side, 8, 0, 0, 0, 0)) +
-            chunk(b"IDAT", rows) + chunk(b"IEND", b""))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", side, side, depth, colour, 0, 0, 0)) +
+            chunk(b"IDAT", data) + chunk(b"IEND", b""))
+
+
+def _png(side, colour=0, level=0x80):
+    """All of one value."""
+    return _png_of(zlib.compress((b"\0" + bytes([level]) * (CHANNELS[colour] * side)) * side, 9), side, colour)
+
+
+def _noisy_png(dice, noise, side):
+    """So many bytes of noise, and black below them."""
+    row = 4 * side
+    rows = [b"\0" + dice.randbytes(row) if y < noise // row else b"\0" * (row + 1) for y in range(side)]
+    return _png_of(zlib.compress(b"".join(rows), 9), side, 6)
 
 
 def _pictured(scene, images):
@@ -130,6 +143,60 @@ def _pictured(scene, images):
 def forty_pictures(side=4096):
     scene = Scene()
     return _pictured(scene, [{"bufferView": scene.view(_png(side)), "mimeType": "image/png"} for _ in range(40)])
+
+
+def large_picture(side=8192):
+    """As many pixels as a picture may have, of colours with alpha."""
+    scene = Scene()
+    return _pictured(scene, [{"bufferView": scene.view(_png(side, colour=6)), "mimeType": "image/png"}])
+
+
+def many_pictures(count=5, side=2048):
+    """Each as dear as the bytes that are left for it, up to a mebibyte in all: nothing in them repeats."""
+    scene, dice = Scene(), random.Random(1)
+    return _pictured(scene, [{"bufferView": scene.view(_noisy_png(dice, 195_000, side)), "mimeType": "image/png"}
+                             for _ in range(count)])
+
+
+def _segment(marker, data):
+    return bytes([0xFF, marker]) + struct.pack(">H", len(data) + 2) + data
+
+
+def _packed(bits):
+    data = int(bits + "1" * (-len(bits) % 8), 2).to_bytes((len(bits) + 7) // 8, "big")
+    return data.replace(b"\xff", b"\xff\0")
+
+
+def _jpeg_of_scans(scans, side=8192):
+    """Progressive, of one channel; all scans but the first say that no block has anything."""
+    blocks = (side // 8) ** 2
+    def table(kind, symbol):
+        return _segment(0xC4, bytes([kind, 1] + [0] * 15 + [symbol]))
+    def scan(first, last, data):
+        return _segment(0xDA, bytes([1, 1, 0, first, last, 0])) + data
+    head = (b"\xff\xd8" + _segment(0xDB, bytes([0]) + b"\1" * 64) +
+            _segment(0xC2, struct.pack(">BHHB3B", 8, side, side, 1, 1, 0x11, 0)) + table(0, 0) + table(0x10, 0xE0))
+    return (head + scan(0, 0, _packed("0" * blocks)) +
+            scan(1, 63, _packed("011111111111111" * (blocks // 32767 + 1))) * scans + b"\xff\xd9")
+
+
+def picture_of_scans(scans=6000):
+    scene = Scene()
+    return _pictured(scene, [{"bufferView": scene.view(_jpeg_of_scans(scans)), "mimeType": "image/jpeg"}])
+
+
+def deep_picture(side=8192):
+    """Of 16 bits a channel."""
+    scene = Scene()
+    rows = zlib.compressobj(9)
+    data = b"".join(rows.compress(b"\0" + b"\x80\x10" * 4 * side) for _ in range(side)) + rows.flush()
+    return _pictured(scene, [{"bufferView": scene.view(_png_of(data, side, 6, 16)), "mimeType": "image/png"}])
+
+
+def tiny_pictures(count=2000, side=64):
+    scene = Scene()
+    return _pictured(scene, [{"bufferView": scene.view(_png(side, level=i % 256)), "mimeType": "image/png"}
+                             for i in range(count)])
 
 
 def cut_off_pictures(count=500, side=2048):

@@ -15,8 +15,10 @@ using Clock = std::chrono::steady_clock;
 
 class PutOff : public ::testing::Test {
  protected:
-  void SetUp() override {
-    auto made = gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = gpu::Sight::kRays});
+  void SetUp() override { start(gpu::Sight::kRays); }
+  void start(gpu::Sight sight) {
+    sight_ = sight;
+    auto made = gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = sight});
     if (!made) GTEST_SKIP() << made.error().text();
     transport_ = std::move(*made);
     ASSERT_TRUE(transport_->setScene(scene_));
@@ -37,8 +39,7 @@ class PutOff : public ::testing::Test {
   void expectWorkersAsEver() {
     const auto batch = mixedBatch(*scene_, 20);
     auto expected = accumulators(*scene_), flux = accumulators(*scene_);
-    auto fresh =
-        gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = gpu::Sight::kRays});
+    auto fresh = gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = sight_});
     ASSERT_TRUE(fresh);
     ASSERT_TRUE((*fresh)->setScene(scene_));
     ASSERT_TRUE((*fresh)->run(batch, expected));
@@ -49,6 +50,7 @@ class PutOff : public ::testing::Test {
 
   std::shared_ptr<const scene::PatchScene> scene_ = randomRoom(402, 13742, 2);
   std::unique_ptr<solver::Transport> transport_;
+  gpu::Sight sight_ = gpu::Sight::kRays;
 };
 
 // Whoever asks without a pause only delays it: each time that nothing came of it, it is left alone twice as long.
@@ -84,6 +86,26 @@ TEST_F(PutOff, ofARunNothingStays) {
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
   expectSame(flux, accumulators(*scene_));
+  expectWorkersAsEver();
+}
+
+TEST_F(PutOff, betweenTwoImagesTooOfScatterShotsAsWell) {
+  start(gpu::Sight::kImages);
+  transport_->setImpatience([] { return true; });
+  auto batch = endless();
+  auto flux = accumulators(*scene_);
+  for (const bool by_scatter : {false, true}) {
+    if (by_scatter) {
+      batch.gather.clear();
+      batch.scatter.assign(20'000, batch.scatter.front());
+    }
+    const auto begun = Clock::now();
+    const auto done = transport_->run(batch, flux);
+    EXPECT_LT(Clock::now() - begun, std::chrono::seconds(10)) << by_scatter;
+    ASSERT_FALSE(done) << by_scatter;
+    EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
+    expectSame(flux, accumulators(*scene_));
+  }
   expectWorkersAsEver();
 }
 

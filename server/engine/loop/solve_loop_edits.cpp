@@ -141,7 +141,7 @@ Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
     return PatchOutcome{revision_, lit_->affectedBy(change, edited->scene),
                         change.geometry ? lit_->solver().shots() : 0};
   }
-  auto next = history_.nextEdit(revision_ + 1, request.by, patch, lit_->document(), edited->document);
+  auto next = history_.nextEdit(revision_ + 1, request.by, patch, lit_->document(), edited->document, edited->parts);
   const auto keep = keepEdit(next, request.receipt, edited->document);
   const auto outcome = adopt(std::move(*edited), keep);
   if (!outcome) return outcome;

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/check.h"
-#include "server/scene/document/json_patch.h"
+#include "server/scene/document/touched_parts.h"
 
 namespace radiosity::engine {
 namespace {
@@ -68,13 +68,15 @@ History::Next History::nextLoad(std::uint64_t revision, const std::string& by, c
 }
 
 History::Next History::nextEdit(std::uint64_t revision, const std::string& by, const json& patch,
-                                const scene::Document& before, const scene::Document& after) const {
+                                const scene::Document& before, const scene::Document& after,
+                                const scene::TouchedParts& parts) const {
   Next next;
   next.entry = {revision, PastRevision::Kind::kPatch, by, summaryOf(patch), now()};
-  next.patch = textOf(scene::diffJson(before.gltf, after.gltf));
+  next.patch = textOf(scene::diffDocuments(before.gltf, after.gltf, parts));
   next.appended = {before.buffers.size(), before.images.size(), appended(before.buffers, after.buffers),
                    appended(before.images, after.images)};
-  next.edit = state::Edit{revision, next.patch, textOf(scene::diffJson(after.gltf, before.gltf)), next.appended};
+  next.edit =
+      state::Edit{revision, next.patch, textOf(scene::diffDocuments(after.gltf, before.gltf, parts)), next.appended};
   for (auto n = done_; n < edits_.size(); ++n) next.forgotten.push_back(edits_[n].revision);
   std::size_t count = done_ + 1, bytes = bytesOf(*next.edit);
   for (std::size_t n = 0; n < done_; ++n) bytes += bytesOf(edits_[n]);

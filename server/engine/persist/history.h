@@ -34,9 +34,10 @@ class History {
   };
   /// Another scene: nothing before it can come back.
   [[nodiscard]] static Next nextLoad(std::uint64_t revision, const std::string& by, const std::string& name);
-  /// An edit; what had been taken back can then no longer be made again.
+  /// An edit of `parts`; what had been taken back can then no longer be made again.
   [[nodiscard]] Next nextEdit(std::uint64_t revision, const std::string& by, const nlohmann::json& patch,
-                              const scene::Document& before, const scene::Document& after) const;
+                              const scene::Document& before, const scene::Document& after,
+                              const scene::TouchedParts& parts = {}) const;
   /// One edit back, or forth again; there must be one.
   [[nodiscard]] Next nextStep(std::uint64_t revision, const std::string& by, bool redo) const;
   /// Before the revision is written: take() then fails for nothing, not for want of memory either.

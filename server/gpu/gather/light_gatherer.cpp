@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "common/task.h"
 #include "server/solver/math/polygon_form_factor.h"
 
 namespace radiosity::gpu {
@@ -123,6 +124,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
     const auto images = source.hemicubes(HemicubePass::kItems, shot.resolution, views, counters);
     const auto pixels = hemicubePixels(shot.resolution);
     for (std::size_t i = 0; i < views.size(); ++i) {
+      interruptionPoint();
       const auto items = images.subspan(i * pixels, pixels);
       const std::size_t half = both && 2 * (first + i) >= points.size() ? 1 : 0;
       testPoint(shot, views[i].frame, items, half);

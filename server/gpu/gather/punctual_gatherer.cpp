@@ -332,6 +332,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
     const auto some = mine.subspan(first, std::min(capacity, mine.size() - first));
     const auto images = source.parallel(shot.resolution, some, counters);
     for (std::size_t i = 0; i < some.size(); ++i) {
+      interruptionPoint();
       const auto items = images.subspan(i * pixels, pixels);
       const auto axes = source.axes(some[i], shot.resolution);
       const auto size = static_cast<int>(shot.resolution);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "common/task.h"
 #include "server/gpu/run/shot_runner.h"
 
 namespace radiosity::gpu {
@@ -79,6 +80,7 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
   }
   std::vector<HemicubeView> views;
   for (std::size_t first = 0; first < looks.size();) {
+    interruptionPoint();
     const auto resolution = shots.gather[looks[first].shot].resolution;
     views.clear();
     auto last = first;
@@ -98,6 +100,7 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
     const auto start = Clock::now();
     const auto pixels = hemicubePixels(resolution);
     for (auto i = first; i < last; ++i) {
+      interruptionPoint();
       const auto& shot = shots.gather[looks[i].shot];
       if (looks[i].point == shot.first_point)
         gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));

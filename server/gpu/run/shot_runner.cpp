@@ -4,6 +4,8 @@
 #include <bit>
 #include <chrono>
 
+#include "common/task.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -133,6 +135,7 @@ void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::Tr
   const auto pass = shots.mode == solver::LinkMode::kPaperMipmap ? HemicubePass::kPaper : HemicubePass::kNodes;
   std::vector<HemicubeView> views;
   for (std::size_t first = 0; first < shots.scatter.size();) {
+    interruptionPoint();
     // Neighbours of equal resolution share an atlas.
     const auto resolution = shots.scatter[first].resolution;
     const auto capacity = images_.hemicubeCapacity(resolution);

@@ -14,6 +14,7 @@
 
 #include "common/bytes.h"
 #include "common/result.h"
+#include "server/scene/document/touched_parts.h"
 #include "server/scene/values/scene.h"
 
 namespace radiosity::scene {
@@ -58,22 +59,23 @@ using FindUpload = std::function<SharedBytes(const std::string& uri)>;
 
 /// RFC 6902 on a copy, then validated by the caller with importScene. Pointers may name things:
 /// /nodes/@lamp/translation. Buffers and images that the patch appends get their bytes from data URIs, from `uploads`,
-/// or (images) from a buffer view. `touched` as in applyJsonPatch.
+/// or (images) from a buffer view.
 [[nodiscard]] Result<Document> applyPatch(const Document& document, const nlohmann::json& patch,
-                                          const FindUpload& uploads = {}, const ImportLimits& limits = {},
-                                          std::vector<std::vector<std::string>>* touched = nullptr);
+                                          const FindUpload& uploads = {}, const ImportLimits& limits = {});
 
 /// A document that has been edited, and the scene that it describes.
 struct EditedDocument {
   Document document;
   Scene scene;
+  TouchedParts parts = {};  ///< that may be others than in the document before the edit
 };
 
 /// importScene on a document that was made from `former`, if from any: what of its JSON is as it was there is not
 /// parsed again, no image is decoded twice, and where nothing but materials differs the rest of the scene is that of
-/// before, not a copy. The same scene, or the same error, where `limits` are those of before.
+/// before, not a copy. The same scene, or the same error, where `limits` are those of before. `parts`: of which alone
+/// it need be looked whether they differ.
 [[nodiscard]] Result<EditedDocument> importEdited(Document document, const Document* former,
-                                                  const ImportLimits& limits = {});
+                                                  const ImportLimits& limits = {}, const TouchedParts& parts = {});
 
 /// applyPatch and importEdited in one. `where` of an error is the JSON pointer alone; `operation` is the one that
 /// failed, or the one whose path lies nearest to what makes the result no scene.

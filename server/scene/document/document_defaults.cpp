@@ -149,25 +149,36 @@ void markUsed(Json& gltf, const char* extension) {
   if (used.is_array() && std::find(used.begin(), used.end(), extension) == used.end()) used.push_back(extension);
 }
 
+/// Of a list of the document, where there is one, all elements, or `some` of them.
+template <typename Do>
+void forEach(Json& gltf, const char* member, bool all, const std::set<std::size_t>& some, const Do& act) {
+  const auto list = gltf.find(member);
+  if (list == gltf.end() || !list->is_array()) return;
+  if (!all) {
+    for (const auto i : some)
+      if (i < list->size()) act((*list)[i]);
+    return;
+  }
+  for (auto& element : *list) {
+    interruptionPoint();
+    act(element);
+  }
+}
+
 }  // namespace
 
-void materialiseDefaults(Json& gltf) {
+void materialiseDefaults(Json& gltf, const TouchedParts& parts) {
   if (!gltf.is_object()) return;
-  if (const auto nodes = gltf.find("nodes"); nodes != gltf.end() && nodes->is_array()) {
-    bool visibility = false;
-    for (auto& node : *nodes) {
-      interruptionPoint();
-      if (!node.is_object()) continue;
-      materialiseTransform(node);
-      visibility |= materialiseVisibility(node);
-    }
-    if (visibility) markUsed(gltf, kVisibility);
-  }
+  bool visibility = false, strength = false;
+  forEach(gltf, "nodes", parts.all, parts.nodes, [&](Json& node) {
+    if (!node.is_object()) return;
+    materialiseTransform(node);
+    visibility |= materialiseVisibility(node);
+  });
+  if (visibility) markUsed(gltf, kVisibility);
   materialiseScenes(gltf);
-  bool strength = false;
-  if (const auto materials = gltf.find("materials"); materials != gltf.end() && materials->is_array()) {
-    for (auto& material : *materials) strength |= materialiseMaterial(material);
-  }
+  forEach(gltf, "materials", parts.all, parts.materials,
+          [&](Json& material) { strength |= materialiseMaterial(material); });
   materialiseLights(gltf);
   if (strength) markUsed(gltf, kEmissiveStrength);
 }

@@ -105,24 +105,34 @@ Error blame(Error error, const std::string& name, const std::vector<Tokens>& tou
   return error;
 }
 
+/// applyPatch(); `touched` as in applyJsonPatch(), also where the rest fails.
+Result<Document> patched(const Document& document, const Json& patch, const FindUpload& uploads,
+                         const ImportLimits& limits, std::vector<Tokens>& touched, TouchedParts& parts) {
+  auto gltf = applyJsonPatch(document.gltf, patch, whyNot, &touched);
+  if (!gltf) return tl::unexpected(gltf.error());
+  parts = touchedParts(patch, touched);
+  Document out = {document.name, std::move(*gltf), document.buffers, document.images};
+  if (auto ok = attachUploads(out, uploads, limits); !ok) return tl::unexpected(ok.error());
+  materialiseDefaults(out.gltf, parts);  // of what was added
+  return out;
+}
+
 }  // namespace
 
 Result<Document> applyPatch(const Document& document, const nlohmann::json& patch, const FindUpload& uploads,
-                            const ImportLimits& limits, std::vector<std::vector<std::string>>* touched) {
-  auto gltf = applyJsonPatch(document.gltf, patch, whyNot, touched);
-  if (!gltf) return tl::unexpected(gltf.error());
-  Document out = {document.name, std::move(*gltf), document.buffers, document.images};
-  if (auto ok = attachUploads(out, uploads, limits); !ok) return tl::unexpected(ok.error());
-  materialiseDefaults(out.gltf);  // of what was added
-  return out;
+                            const ImportLimits& limits) {
+  std::vector<Tokens> touched;
+  TouchedParts parts;
+  return patched(document, patch, uploads, limits, touched, parts);
 }
 
 Result<EditedDocument> editDocument(const Document& document, const nlohmann::json& patch, const FindUpload& uploads,
                                     const ImportLimits& limits) {
   std::vector<Tokens> touched;
-  auto next = applyPatch(document, patch, uploads, limits, &touched);
+  TouchedParts parts;
+  auto next = patched(document, patch, uploads, limits, touched, parts);
   if (!next) return tl::unexpected(blame(next.error(), document.name, touched));
-  auto edited = importEdited(std::move(*next), &document, limits);
+  auto edited = importEdited(std::move(*next), &document, limits, parts);
   if (!edited) return tl::unexpected(blame(edited.error(), document.name, touched));
   return edited;
 }

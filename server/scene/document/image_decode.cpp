@@ -133,6 +133,23 @@ Texture halved(const Pixels& from) {
 
 Pixels pixelsOf(const Texture& texture) { return {texture.rgba.data(), texture.width, texture.height, texture.srgb}; }
 
+/// stb_image inflates 16 bits a channel before it makes eight of them.
+bool isDeepPng(const Bytes& bytes) {
+  constexpr std::size_t kDepth = 24;  // of the file: 8 bytes of signature, 8 of the chunk's head, width, height
+  return sniffImageType(bytes) == "image/png" && bytes.size() > kDepth && bytes[kDepth] == 16;
+}
+
+/// Progressive pictures have ten or so. Each is a walk over all blocks, even where it says nothing in a hundred bytes.
+constexpr std::ptrdiff_t kMostScans = 256;
+
+/// Those of a thumbnail in its head are counted as well.
+std::ptrdiff_t scansOfJpeg(const Bytes& bytes) {
+  if (sniffImageType(bytes) != "image/jpeg") return 0;
+  std::ptrdiff_t count = 0;
+  for (std::size_t i = 1; i < bytes.size(); ++i) count += bytes[i - 1] == 0xFF && bytes[i] == 0xDA ? 1 : 0;
+  return count;
+}
+
 }  // namespace
 
 std::string sniffImageType(const Bytes& bytes) {
@@ -158,10 +175,15 @@ Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const 
     return fail(ErrorCode::kBadInput, "image header cannot be read: " + decoderReason(), where);
   }
   const ImageSize size{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+  if (const auto scans = scansOfJpeg(bytes); scans > kMostScans) {
+    return fail(ErrorCode::kTooLarge,
+                "image has " + std::to_string(scans) + " scans; the limit is " + std::to_string(kMostScans), where);
+  }
+  if (isDeepPng(bytes)) max_pixels /= 2;
   if (size.pixels() > max_pixels) {
     return fail(ErrorCode::kTooLarge,
                 "image is " + std::to_string(width) + " x " + std::to_string(height) + "; the limit is " +
-                    std::to_string(max_pixels) + " pixels",
+                    std::to_string(max_pixels) + (isDeepPng(bytes) ? " pixels of 16 bits a channel" : " pixels"),
                 where);
   }
   return size;

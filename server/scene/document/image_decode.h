@@ -24,7 +24,8 @@ struct ImageSize {
     return {std::max(1U, width >> times), std::max(1U, height >> times)};
   }
 };
-/// From the header. kTooLarge: more than `max_pixels`; kUnsupported and kBadInput: it is no PNG or JPEG.
+/// From the header. kTooLarge: more than `max_pixels`, of 16 bits a channel half as many, or more scans than any honest
+/// JPEG has; kUnsupported and kBadInput: it is no PNG or JPEG.
 [[nodiscard]] Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where);
 
 /// How a picture is held.
@@ -32,7 +33,7 @@ struct ImageUse {
   bool srgb = false;
   std::uint32_t halvings = 0;  ///< as halve()
 };
-/// RGBA, 8 bits a channel. kTooLarge when the header says more than `max_pixels`; nothing is allocated then. While it
+/// RGBA, 8 bits a channel. kTooLarge as sizeOfImage(); nothing is allocated then. While it
 /// works there is 4 bytes for each of the file's pixels, and what the decoder needs for itself.
 [[nodiscard]] Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where,
                                           const ImageUse& use = {});

@@ -108,6 +108,16 @@ std::size_t jsonDepth(const Json& value) {
   return deepest;
 }
 
+bool isIdentical(const Json& a, const Json& b) {
+  if (a.type() != b.type()) return false;
+  if (a.is_array()) return std::equal(a.begin(), a.end(), b.begin(), b.end(), isIdentical);
+  if (!a.is_object()) return a == b;
+  const auto& of_b = b.get_ref<const Json::object_t&>();
+  return std::ranges::equal(a.get_ref<const Json::object_t&>(), of_b, [](const auto& one, const auto& other) {
+    return one.first == other.first && isIdentical(one.second, other.second);
+  });
+}
+
 std::string escapeToken(std::string_view token) {
   std::string out;
   for (const char c : token) {

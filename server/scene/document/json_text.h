@@ -20,6 +20,9 @@ using Json = nlohmann::json;
 /// Levels of nesting of a value that is already parsed; walks with a stack of its own.
 [[nodiscard]] std::size_t jsonDepth(const Json& value);
 
+/// The same also in what kind of number stands there: 1.0 equals 1, but is no index.
+[[nodiscard]] bool isIdentical(const Json& a, const Json& b);
+
 /// RFC 6901 escaping of one token: ~ -> ~0, / -> ~1.
 [[nodiscard]] std::string escapeToken(std::string_view token);
 

@@ -15,7 +15,9 @@
 namespace radiosity::scene {
 namespace {
 
-/// Names of all extensions used in a document; values nest at most 64 deep.
+constexpr const char* kMaterials = "materials";
+
+/// Names of all extensions used in a value; they nest at most 64 deep.
 void collectExtensions(const Json& value, std::set<std::string>& names) {
   if (!value.is_structured()) return;
   for (const auto& [key, child] : value.items()) {
@@ -28,10 +30,9 @@ void collectExtensions(const Json& value, std::set<std::string>& names) {
   }
 }
 
-void warnUndeclared(ImportContext& context) {
+void warnUndeclared(ImportContext& context, std::set<std::string> names) {
   const auto& gltf = context.document.gltf;
-  std::set<std::string> names;
-  collectExtensions(gltf, names);
+  if (const auto found = gltf.find(kMaterials); found != gltf.end()) collectExtensions(*found, names);
   const auto declared = gltf.value("extensionsUsed", Json::array());
   for (const auto& name : names) {
     if (std::find(declared.begin(), declared.end(), name) != declared.end()) continue;
@@ -103,13 +104,13 @@ void warnTransforms(ImportContext& context) {
   auto flat = flatPlaces(), far = farPlaces();
   for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
     const auto& node = context.model.nodes[n];
-    const auto pointer = "/nodes/" + std::to_string(n);
+    const auto pointer = [n] { return "/nodes/" + std::to_string(n); };
     const bool has_matrix = !node.matrix.empty();
     const auto local = localMatrix(node);
     const glm::dvec3 sides(glm::length(glm::dvec3(local[0])), glm::length(glm::dvec3(local[1])),
                            glm::length(glm::dvec3(local[2])));
-    if (isFlat(sides)) flat.add(pointer + (has_matrix ? "/matrix" : "/scale"));
-    if (isFar(glm::dvec3(local[3]))) far.add(pointer + (has_matrix ? "/matrix" : "/translation"));
+    if (isFlat(sides)) flat.add(pointer() + (has_matrix ? "/matrix" : "/scale"));
+    if (isFar(glm::dvec3(local[3]))) far.add(pointer() + (has_matrix ? "/matrix" : "/translation"));
   }
   flat.tell(context, " other nodes");
   far.tell(context, " other nodes");
@@ -118,9 +119,10 @@ void warnTransforms(ImportContext& context) {
 void warnNodes(ImportContext& context) {
   for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
     const auto& node = context.model.nodes[n];
+    if (node.mesh >= 0) continue;
     const auto pointer = "/nodes/" + std::to_string(n);
-    if (node.mesh < 0 && node.skin >= 0) context.warn(pointer + "/skin", "means nothing without a mesh");
-    if (node.mesh < 0 && !node.weights.empty()) context.warn(pointer + "/weights", "mean nothing without a mesh");
+    if (node.skin >= 0) context.warn(pointer + "/skin", "means nothing without a mesh");
+    if (!node.weights.empty()) context.warn(pointer + "/weights", "mean nothing without a mesh");
   }
 }
 
@@ -179,8 +181,20 @@ void warnAboutElements(ImportContext& context, const std::vector<Trs>& elements,
   far.tell(context, " other elements");
 }
 
-void warnAboutOddities(ImportContext& context) {
-  warnUndeclared(context);
+std::set<std::string> extensionsBesideMaterials(const Json& gltf) {
+  std::set<std::string> names;
+  for (const auto& [member, value] : gltf.items()) {
+    if (member == kMaterials || member == "extras") continue;
+    if (member == "extensions" && value.is_object()) {
+      for (const auto& extension : value.items()) names.insert(extension.key());
+    }
+    collectExtensions(value, names);
+  }
+  return names;
+}
+
+void warnAboutOddities(ImportContext& context, std::set<std::string> extensions) {
+  warnUndeclared(context, std::move(extensions));
   warnAccessors(context);
   warnMeshes(context);
   warnNodes(context);

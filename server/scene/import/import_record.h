@@ -8,6 +8,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "common/bytes.h"
@@ -27,9 +29,10 @@ using DecodedImages = std::map<SharedBytes, DecodedImage>;
 struct ImportRecord {
   std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
   std::vector<tinygltf::Material> materials;
-  DecodedImages images;             ///< that the materials use
-  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images
-  Scene scene;                      ///< shares what is large with the one that was imported
+  DecodedImages images;              ///< that the materials use
+  std::uint64_t claimed_bytes = 0;   ///< of memory, by all but images
+  std::set<std::string> extensions;  ///< that are used anywhere but in materials
+  Scene scene;                       ///< shares what is large with the one that was imported
   /// Of its warnings, how many there were after each step.
   struct Warnings {
     std::size_t checks = 0, materials = 0, nodes = 0;

@@ -18,7 +18,7 @@ namespace {
 
 /// Of more nodes, meshes, materials, accessors and instances, a kilobyte each at most, nothing is kept for the next
 /// edit.
-constexpr std::size_t kMostParsed = 20'000;
+constexpr std::size_t kMostParsed = 250'000;
 
 /// `former`: null for none.
 Result<Scene> importAll(const Document& document, const Document* former, const ImportLimits& limits,
@@ -43,25 +43,16 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
   record.warnings.materials = scene.warnings.size();
   if (auto ok = importNodes(context); !ok) return tl::unexpected(ok.error());
   record.warnings.nodes = scene.warnings.size();
-  warnAboutOddities(context);
+  record.extensions = extensionsBesideMaterials(document.gltf);
+  warnAboutOddities(context, record.extensions);
   return scene;
 }
 
-/// Also in what kind of number stands there: 1.0 equals 1, but is no index.
-bool isIdentical(const Json& a, const Json& b) {
-  if (a.type() != b.type()) return false;
-  if (a.is_array()) return std::equal(a.begin(), a.end(), b.begin(), b.end(), isIdentical);
-  if (!a.is_object()) return a == b;
-  const auto& of_b = b.get_ref<const Json::object_t&>();
-  return std::ranges::equal(a.get_ref<const Json::object_t&>(), of_b, [](const auto& one, const auto& other) {
-    return one.first == other.first && isIdentical(one.second, other.second);
-  });
-}
-
 /// But for materials, of which there are as many, `a` and `b` are the same.
-bool differInMaterialsAlone(const Document& a, const Document& b) {
-  if (a.name != b.name || a.buffers != b.buffers || a.images != b.images || a.gltf.size() != b.gltf.size())
-    return false;
+bool differInMaterialsAlone(const Document& a, const Document& b, const TouchedParts& parts) {
+  if (a.name != b.name || a.buffers != b.buffers || a.images != b.images) return false;
+  if (!parts.all) return touchMaterialsAlone(parts, a.gltf, b.gltf);
+  if (a.gltf.size() != b.gltf.size()) return false;
   for (const auto& [member, value] : a.gltf.items()) {
     const auto found = b.gltf.find(member);
     if (found == b.gltf.end()) return false;
@@ -98,7 +89,8 @@ Result<Scene> importWithOtherMaterials(const Document& document, const ImportRec
   record.warnings.materials = scene.warnings.size();
   scene.warnings.insert(scene.warnings.end(), warned(before.warnings.materials), warned(before.warnings.nodes));
   record.warnings.nodes = scene.warnings.size();
-  warnAboutOddities(context);
+  record.extensions = before.extensions;
+  warnAboutOddities(context, record.extensions);
   return scene;
 }
 
@@ -109,9 +101,10 @@ Result<Scene> importScene(const Document& document, const ImportLimits& limits) 
   return importAll(document, nullptr, limits, record);
 }
 
-Result<EditedDocument> importEdited(Document document, const Document* former, const ImportLimits& limits) {
+Result<EditedDocument> importEdited(Document document, const Document* former, const ImportLimits& limits,
+                                    const TouchedParts& parts) {
   auto record = std::make_shared<ImportRecord>();
-  const bool same_shape = former != nullptr && former->imported && differInMaterialsAlone(document, *former);
+  const bool same_shape = former != nullptr && former->imported && differInMaterialsAlone(document, *former, parts);
   auto scene = same_shape ? importWithOtherMaterials(document, *former->imported, limits, *record)
                           : importAll(document, former, limits, *record);
   if (!scene) return tl::unexpected(scene.error());
@@ -123,7 +116,7 @@ Result<EditedDocument> importEdited(Document document, const Document* former, c
     record->scene = *scene;
     document.imported = std::move(record);
   }
-  return EditedDocument{std::move(document), std::move(*scene)};
+  return EditedDocument{std::move(document), std::move(*scene), parts};
 }
 
 }  // namespace radiosity::scene

@@ -93,7 +93,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
 }
 
 bool LinkedSolver::save(ArchiveWriter& to) const {
-  if (pass_ != Pass::kNone || isBehind()) return false;
+  if (pass_ != Pass::kNone || assessing_ != Assessed::kNothing || isBehind()) return false;
   to(kKind, static_cast<std::uint64_t>(system_.leafAreas().size()));
   visit(to, *this);
   to(std::vector<CrowdLight>(crowds_.begin(), crowds_.end()));

@@ -114,7 +114,8 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
-  refined_ = is_confirmed_ = false;
+  refined_ = is_confirmed_ = is_tracing_ = false;
+  assessing_ = Assessed::kNothing;
   edit_lights_planned_ = false;
   error_ = {};  // unknown
   shown_ = nullptr;
@@ -144,8 +145,8 @@ void LinkedSolver::dropNodes() {
   share_part_ = 1.0 / settings_.planner.first_shooters;
 }
 
-/// False: the light is to be solved for again, since there was no room for the links of a new lamp and others had to
-/// go, or after more repairs (isRepairing).
+/// What follows is to assess what there is. False: the light is to be solved for again, since there was no room for the
+/// links of a new lamp and others had to go, or after more repairs (isRepairing).
 bool LinkedSolver::finishEdit() {
   wanted_.clear();
   measured_ = 0;
@@ -169,7 +170,11 @@ bool LinkedSolver::finishEdit() {
     }
     growing_ = !wanted_.empty() && (wantsLamp() || !mayGoWithout());
   }
-  assessStep();
+  return true;
+}
+
+/// False: as finishEdit().
+bool LinkedSolver::choosesAfterEdit() {
   if (isDueForTarget()) {
     wanted_.clear();
     from_links_ = FromLinks::kAfterEdit;

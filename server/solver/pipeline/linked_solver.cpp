@@ -198,16 +198,21 @@ Result<StepOutcome> LinkedSolver::step() {
     return advance();
   } catch (const std::bad_alloc&) {
     pass_ = Pass::kNone;  // what was half done is begun anew
+    assessing_ = Assessed::kNothing;
+    is_tracing_ = false;
     return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
                                           " shooters and " + std::to_string(system_.bytes() >> 20U) +
                                           " MiB of links; fewer texels, or a larger error, need less");
   } catch (const std::system_error& error) {
     pass_ = Pass::kNone;
+    assessing_ = Assessed::kNothing;
+    is_tracing_ = false;
     return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
   }
 }
 
 Result<StepOutcome> LinkedSolver::advance() {
+  if (assessing_ != Assessed::kNothing) return assessed();
   if (in_haste_ && !settling_ && measured_ == wanted_.size()) forgetRough();
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
@@ -228,7 +233,8 @@ Result<StepOutcome> LinkedSolver::advance() {
     }
     if (!settleFromLinks() || findsMoreDue()) return StepOutcome::kSlice;
     if (!finishEdit()) return StepOutcome::kSlice;
-    return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
+    assessing_ = Assessed::kEdit;
+    return assessed();
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (std::exchange(refined_, false)) return chooseNext();
@@ -261,7 +267,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
   if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
-  if (isRepairing() || from_links_ != FromLinks::kNo || settling_) return;
+  if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || assessing_ != Assessed::kNothing) return;
   // Without crowds most of the light may be missing; in haste they take less than one other measurement.
   const auto left = wanted_.begin() + static_cast<std::ptrdiff_t>(measured_);
   const auto is_crowd = [this](const Measurement& want) { return isFirstOfCrowd(want); };
@@ -275,9 +281,25 @@ StepOutcome LinkedSolver::finishRound() {
   growing_ = false;
   ++rounds_;
   refined_ = true;
-  assessStep();
-  refined_ = false;
-  return chooseNext();
+  assessing_ = Assessed::kRound;
+  return assessed();
+}
+
+/// Goes on from where something was reached, as soon as all is known of it.
+StepOutcome LinkedSolver::assessed() {
+  if (!assessStep()) return StepOutcome::kSlice;
+  switch (std::exchange(assessing_, Assessed::kNothing)) {
+    case Assessed::kRound:
+      refined_ = false;
+      return chooseNext();
+    case Assessed::kEdit:
+      if (!choosesAfterEdit()) return StepOutcome::kSlice;
+      return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
+    default:
+      if (error_.total > settings_.target_error) return chooseFurther();
+      endHere();
+      return StepOutcome::kConverged;
+  }
 }
 
 /// What waits may be what is missing.
@@ -330,10 +352,8 @@ bool LinkedSolver::aimFurther() {
 StepOutcome LinkedSolver::confirm() {
   if (!settleFromLinks()) return StepOutcome::kSlice;
   from_links_ = FromLinks::kNo;
-  assessStep();
-  if (error_.total > settings_.target_error) return chooseFurther();
-  endHere();
-  return StepOutcome::kConverged;
+  assessing_ = Assessed::kSolution;
+  return assessed();
 }
 
 StepOutcome LinkedSolver::chooseFurther() {
@@ -376,6 +396,7 @@ void LinkedSolver::setTargetError(double target) {
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);
   if (variation_) tryNow([this] { updateVariation(); });
+  if (assessing_ != Assessed::kNothing) return;  // which is for this target
   if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
       error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it
     tryNow([this] { gather_->giveUp(); });

@@ -101,6 +101,8 @@ class LinkedSolver final : public Solver {
   enum class Pass { kNone, kFirst, kSecond, kRays };
   /// What a solution over nothing but the links is for.
   enum class FromLinks { kNo, kAfterEdit, kToConfirm };
+  /// What was reached and is being assessed, for which paths may have to be traced.
+  enum class Assessed { kNothing, kRound, kEdit, kSolution };
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self);
@@ -232,6 +234,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool advanceSolution();
   [[nodiscard]] bool settleFromLinks();
   [[nodiscard]] bool finishEdit();
+  [[nodiscard]] bool choosesAfterEdit();
+  [[nodiscard]] StepOutcome assessed();
   [[nodiscard]] bool mayGoWithout();
   [[nodiscard]] bool lightLeaves();
   void shadeLeaves();
@@ -275,7 +279,7 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] bool wantsLamp() const;
   [[nodiscard]] bool sideShines(std::uint32_t side) const;
-  void assessStep();
+  [[nodiscard]] bool assessStep();
   /// What the halves' light says, of all leaves; received and reflected flux.
   struct FieldSums {
     FieldError field;
@@ -283,6 +287,7 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] FieldSums assessField() const;
   void updateVariation();
+  [[nodiscard]] bool updateVariation(LeafVariation& variation, double seconds);
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();
   [[nodiscard]] double targetOfLinks() const;
@@ -390,9 +395,11 @@ class LinkedSolver final : public Solver {
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
   std::unique_ptr<LeafVariation> variation_;          // once little else is in error
   std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then
-  bool refined_ = false;                              // more paths were traced: what is next is to be chosen anew
-  double square_ = 0.0;                               // of the light that it was brought up to date with, times area
-  double by_links_ = 0.0;                             // sampling error without the noise of that
+  bool is_tracing_ = false;                           // its paths, in slices
+  Assessed assessing_ = Assessed::kNothing;
+  bool refined_ = false;   // more paths were traced: what is next is to be chosen anew
+  double square_ = 0.0;    // of the light that it was brought up to date with, times area
+  double by_links_ = 0.0;  // sampling error without the noise of that
   ErrorParts error_;
   KeptEnds ends_;
   std::shared_ptr<const KeptEnd> shown_;  // what is told is that; null: it is what was solved for last

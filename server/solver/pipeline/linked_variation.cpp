@@ -4,6 +4,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
+#include <utility>
 
 #include "common/parallel.h"
 #include "server/solver/pipeline/linked_solver.h"
@@ -41,22 +42,30 @@ bool LinkedSolver::wantsVariation() const {
 
 /// assess() at an end of what the solver does, and not when somebody looks: then alone paths are traced first, so that
 /// what they are does not depend on the clock.
-void LinkedSolver::assessStep() {
+/// False: some are still to be traced, go on with the next slice.
+bool LinkedSolver::assessStep() {
+  if (!std::exchange(is_tracing_, false)) {
+    assess();
+    if (!wantsVariation()) return true;
+    if (!next_variation_)
+      next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
+  }
+  is_tracing_ = !updateVariation(*next_variation_, kSliceSeconds);
+  if (is_tracing_) return false;
+  variation_ = std::move(next_variation_);
   assess();
-  if (!wantsVariation()) return;
-  variation_ = next_variation_ ? std::move(next_variation_)
-                               : std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
-  updateVariation();
-  assess();
+  return true;
 }
 
-/// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
-  if (hasTooManyLamps()) {  // an edit lit them
-    variation_.reset();
-    return next_variation_.reset();
-  }
-  variation_->forgetCorrections();  // also where memory ends on the way
+  if (!hasTooManyLamps()) return (void)updateVariation(*variation_, HUGE_VAL);
+  variation_.reset();  // an edit lit them
+  next_variation_.reset();
+}
+
+/// For the light that leaves have now. False: go on with the next slice.
+bool LinkedSolver::updateVariation(LeafVariation& variation, double seconds) {
+  variation.forgetCorrections();  // also where memory ends on the way
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
   std::vector<double> squares(sides_.size(), 0.0);
   const auto sumUp = [&](std::size_t s) {
@@ -73,9 +82,9 @@ void LinkedSolver::updateVariation() {
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
   const double bound = kNegligible * aim_;
-  variation_->update(
+  return variation.update(
       {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr},
-      bound * bound * square);
+      bound * bound * square, seconds);
 }
 
 /// What is to be reached by links, beside what varies within leaves.

@@ -22,6 +22,7 @@ constexpr double kLeastSlice = 1'000'000.0;
 void Wave::begin(ShotBatch batch, const scene::PatchScene& patches) {
   RAD_CHECK(!under_way_);
   batch_ = std::move(batch);
+  slice_.reset();
   flux_.reset(patches.nodeCount());
   cost_ = {static_cast<double>(patches.triangles.size()), static_cast<double>(patches.leaves.size())};
   next_gather_ = next_scatter_ = 0;
@@ -47,6 +48,7 @@ ShotBatch Wave::nextSlice() {
   const double target = cost_left_ / std::max(1.0, std::ceil(cost_left_ / most));
   ShotBatch slice;
   slice.mode = batch_.mode;
+  slice.may_be_put_off = true;
   slice.flux_scale = batch_.flux_scale;
   slice_cost_ = 0.0;
   if (std::exchange(others_left_, false)) {  // lights that are no surfaces come in small batches already
@@ -67,9 +69,11 @@ ShotBatch Wave::nextSlice() {
 
 Result<bool> Wave::advance(Transport& transport, TransportCounters& counters) {
   RAD_CHECK(under_way_);
-  const ShotBatch slice = nextSlice();
+  if (!slice_) slice_ = nextSlice();
   const auto start = std::chrono::steady_clock::now();
-  const auto done = transport.run(slice, flux_);
+  const auto done = transport.run(*slice_, flux_);
+  if (!done && done.error().code == ErrorCode::kCancelled) return false;  // put off: nothing of it has arrived
+  slice_.reset();
   if (!done) {
     under_way_ = false;
     return tl::unexpected<Error>(done.error());

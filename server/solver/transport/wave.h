@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 
 #include "common/result.h"
 #include "server/scene/values/patch_scene.h"
@@ -19,7 +20,7 @@ class Wave {
   [[nodiscard]] bool underWay() const { return under_way_; }
 
   /// Has the transport carry out the next slice and adds what was done to `counters`. True: that was the last one, and
-  /// flux() is what the whole wave delivered. After an error the wave is lost.
+  /// flux() is what the whole wave delivered. A slice that was put off comes again. After an error the wave is lost.
   [[nodiscard]] Result<bool> advance(Transport& transport, TransportCounters& counters);
 
   [[nodiscard]] FluxAccumulators& flux() { return flux_; }
@@ -30,6 +31,7 @@ class Wave {
   void fill(const std::vector<Shot>& shots, std::size_t& next, double target, double& cost, Take take) const;
 
   ShotBatch batch_;
+  std::optional<ShotBatch> slice_;  // the next one, where it was put off
   FluxAccumulators flux_;
   ShotCost cost_{0.0};
   std::size_t next_gather_ = 0, next_scatter_ = 0;

@@ -93,7 +93,7 @@ bool LeafVariation::isWhole() const {
 }
 
 /// As many paths as count_ says.
-void LeafVariation::traceAll(const LeafLight& light) {
+bool LeafVariation::traceAll(const LeafLight& light, Clock::time_point end) {
   const auto shines = [](const PunctualLights::Source& source) { return source.intensity != glm::dvec3(0.0); };
   if (traced_for_ != kept_for_ || std::ranges::any_of(light.sources, shines)) {
     for (auto& half : there_) {
@@ -103,8 +103,9 @@ void LeafVariation::traceAll(const LeafLight& light) {
   if (count_.empty()) count_.assign(receivers_.size(), 1);
   std::vector<Task> tasks(receivers_.size());
   for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], 0, count_[r]};
-  trace(tasks, light);
+  if (!trace(tasks, light, end)) return false;
   forgetFormer();
+  return true;
 }
 
 std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {
@@ -114,7 +115,11 @@ std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {
   return tasks;
 }
 
-void LeafVariation::update(const LeafLight& light, double bound) {
+bool LeafVariation::update(const LeafLight& light, double bound, double seconds) {
+  const auto end =
+      seconds < kNoEnd
+          ? Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))
+          : Clock::time_point::max();
   RAD_CHECK(std::max(light.lights.size(), light.sources.size()) <= std::size_t{1} << 16U);  // paths number them
   std::uint64_t shining = 1;
   for (std::size_t i = 0; i < light.lights.size(); ++i)
@@ -126,10 +131,10 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   traced_for_ = shining;
   if (!is_traced_) {
     wanted_.clear();
-    traceAll(light);
+    if (!traceAll(light, end)) return false;
     is_traced_ = true;  // not where memory ran out: no paths would say that nothing varies
   }
-  trace(wanted_, light);
+  if (!trace(wanted_, light, end)) return false;
   wanted_.clear();
   forgetCorrections();
   sumUp(light);
@@ -137,7 +142,7 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
   const auto isUnsure = [&] { return found_ + deviation_ > bound && found_ < kSurely * deviation_; };
   while ((isUnsure() || paths_[0].size() < kFewestPaths) && fewest() < kEvenPaths) {
-    trace(twiceAsMany(), light);
+    if (!trace(twiceAsMany(), light, end)) return false;
     for (auto& count : count_)
       if (count < kEvenPaths) count = static_cast<std::uint16_t>(2 * count);
     sumUp(light);
@@ -149,6 +154,8 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   giveBack(gain_);
   if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();
   for (auto& half : lacking_) giveBack(half);
+  under_way_ = {};
+  return true;
 }
 
 void LeafVariation::forgetCorrections() {

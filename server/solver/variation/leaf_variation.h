@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -60,8 +61,11 @@ class LeafVariation {
 
   /// Brings all that is below up to date with the light. Paths are traced when there are none, and followed to the
   /// lights again when others shine; more are traced until what varies is known to be little beside `bound`, an
-  /// irradiance squared times area as below, or is found to be more. Below the bound nothing is corrected.
-  void update(const LeafLight& light, double bound);
+  /// irradiance squared times area as below, or is found to be more. Below the bound nothing is corrected. After so
+  /// many seconds of tracing, about, it returns false: it is to be called again, and goes on; what it comes to in the
+  /// end does not depend on that.
+  [[nodiscard]] bool update(const LeafLight& light, double bound, double seconds);
+  void update(const LeafLight& light, double bound) { (void)update(light, bound, kNoEnd); }
 
   /// What it corrects is of another light: it corrects nothing until the next update().
   void forgetCorrections();
@@ -131,14 +135,24 @@ class LeafVariation {
   /// A receiver is to have paths first .. end - 1.
   struct Task {
     std::uint32_t receiver, first, end;
+    bool operator==(const Task&) const = default;
   };
 
   [[nodiscard]] static std::uint64_t numberOf(std::uint32_t receiver, std::uint32_t index) {
     return std::uint64_t{receiver} << 16U | index;
   }
   [[nodiscard]] bool isNear(const LeafRays::Sight& sight) const;
-  void traceAll(const LeafLight& light);
-  void trace(std::span<const Task> tasks, const LeafLight& light);
+  static constexpr double kNoEnd = 1e30;  ///< seconds
+  using Clock = std::chrono::steady_clock;
+  /// Paths that are traced, but not yet among the others, since not all that were asked for are.
+  struct UnderWay {
+    std::vector<Task> tasks;
+    std::uint64_t lights = 0;                                  ///< which shine
+    std::vector<std::array<std::vector<Path>, 2>> found = {};  ///< by share of the tasks and half
+    std::size_t done = 0;                                      ///< shares
+  };
+  [[nodiscard]] bool traceAll(const LeafLight& light, Clock::time_point end);
+  [[nodiscard]] bool trace(std::span<const Task> tasks, const LeafLight& light, Clock::time_point end);
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
   void followLights(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
   void takeOtherLights(const LeafLight& light, std::uint64_t shining);
@@ -185,12 +199,13 @@ class LeafVariation {
   const std::vector<Side>& sides_;
   std::shared_ptr<const LeafRays> rays_;
   std::uint64_t seed_;
-  std::vector<std::uint32_t> receivers_;        ///< leaf values, ascending
-  double stands_for_ = 1.0;                     ///< leaves, for each receiver
-  std::vector<std::uint16_t> count_;            ///< paths of each half, by receiver; empty: none were traced yet
-  std::uint64_t traced_for_ = 0;                ///< which lights
-  bool is_traced_ = false;                      ///< as many paths as count_ says
-  std::vector<Task> wanted_;                    ///< by refine()
+  std::vector<std::uint32_t> receivers_;  ///< leaf values, ascending
+  double stands_for_ = 1.0;               ///< leaves, for each receiver
+  std::vector<std::uint16_t> count_;      ///< paths of each half, by receiver; empty: none were traced yet
+  std::uint64_t traced_for_ = 0;          ///< which lights
+  bool is_traced_ = false;                ///< as many paths as count_ says
+  std::vector<Task> wanted_;              ///< by refine()
+  UnderWay under_way_;
   std::array<std::vector<Path>, 2> paths_;      ///< by half
   std::array<std::vector<Lit>, 2> lit_before_;  ///< of the first of them: by lights that shone before
   std::uint64_t lit_before_for_ = 0;            ///< which

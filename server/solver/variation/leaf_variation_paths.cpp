@@ -21,6 +21,8 @@ namespace {
 constexpr double kNear = 4.0;
 /// Fewer tasks than these are not worth a thread's turn.
 constexpr std::size_t kTasksAShare = 64;
+/// And between two looks at the clock there are so many shares: some milliseconds, enough for many threads.
+constexpr std::size_t kSharesATime = 32;
 
 std::uint64_t keyOfLight(std::uint64_t path_key) { return mixKeys(path_key, 3); }
 
@@ -198,16 +200,29 @@ void LeafVariation::followOtherLights(const LeafLight& light, std::size_t half, 
   });
 }
 
-/// The order of paths, and so the bits of their sums, does not depend on how many threads share them.
-void LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light) {
-  std::vector<std::array<std::vector<Path>, 2>> found;
+/// The order of paths, and so the bits of their sums, does not depend on how many threads share them, nor on how often
+/// it stops. False: it stopped at `end`.
+bool LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light, Clock::time_point end) {
+  if (tasks.empty()) return true;
   const std::size_t shares = std::max<std::size_t>(1, tasks.size() / kTasksAShare);
-  found.resize(shares);
-  inTurns(shares, [&](std::size_t share) {
-    for (auto i = share * tasks.size() / shares; i < (share + 1) * tasks.size() / shares; ++i) {
-      for (std::size_t half = 0; half < 2; ++half) follow(tasks[i], half, light, found[share][half]);
-    }
-  });
+  auto& found = under_way_.found;
+  if (under_way_.lights != traced_for_ || !std::ranges::equal(under_way_.tasks, tasks)) {
+    under_way_ = {{tasks.begin(), tasks.end()}, traced_for_};
+    found.resize(shares);
+  }
+  while (under_way_.done < shares) {
+    const auto first = under_way_.done;
+    const auto last = end == Clock::time_point::max() ? shares : std::min(shares, first + kSharesATime);
+    inTurns(last - first, [&](std::size_t turn) {
+      const auto share = first + turn;
+      found[share] = {};  // memory may have ended in the midst of it
+      for (auto i = share * tasks.size() / shares; i < (share + 1) * tasks.size() / shares; ++i) {
+        for (std::size_t half = 0; half < 2; ++half) follow(tasks[i], half, light, found[share][half]);
+      }
+    });
+    under_way_.done = last;
+    if (last < shares && Clock::now() >= end) return false;
+  }
   for (std::size_t half = 0; half < 2; ++half) {  // all room first: without memory nothing is to be there twice
     std::size_t more = 0;
     for (const auto& share : found) more += share[half].size();
@@ -217,6 +232,8 @@ void LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light) {
     for (std::size_t half = 0; half < 2; ++half)
       paths_[half].insert(paths_[half].end(), share[half].begin(), share[half].end());
   }
+  under_way_ = {};
+  return true;
 }
 
 /// By one path, times the paths of the receiver.

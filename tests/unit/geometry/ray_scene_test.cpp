@@ -7,6 +7,9 @@
 #include <glm/geometric.hpp>
 #include <optional>
 #include <random>
+#include <utility>
+
+#include "server/geometry/same_triangles.h"
 
 namespace radiosity::geometry {
 namespace {
@@ -190,6 +193,71 @@ TEST(RayScene, WhatOneCanSeeThroughIsAsked) {
   EXPECT_EQ(scene.nearest(Ray{{-0.9F, 1, 0}, {0, -1, 0}, 4.0F}).triangle, 1U);  // it is met all the same
   EXPECT_TRUE(scene.open(Ray{{0.9F, 1, 0}, {0, -1, 0}, 4.0F}));
   EXPECT_FALSE(scene.open(Ray{{-0.9F, 1, 0}, {0, -1, 0}, 4.0F}));  // the wall
+}
+
+/// Soup of which each piece is there `copies` times, far apart in the order.
+std::vector<Triangle> copiedSoup(std::size_t count, std::size_t copies, std::uint32_t seed) {
+  const auto once = soup(count, seed);
+  std::vector<Triangle> triangles;
+  for (std::size_t copy = 0; copy < copies; ++copy) triangles.insert(triangles.end(), once.begin(), once.end());
+  return triangles;
+}
+
+TEST(RayScene, CopiesAreMetOneAfterTheOther) {
+  constexpr std::uint32_t kCount = 60, kCopies = 9;
+  const auto once = sceneOf(soup(kCount, 3)), all = sceneOf(copiedSoup(kCount, kCopies, 3));
+  std::size_t met = 0;
+  for (auto ray : raysThrough(2000, 5)) {
+    const auto expected = once.nearest(ray);
+    std::vector<std::uint32_t> passed;
+    for (std::uint32_t copy = 0; expected.found() && copy < kCopies; ++copy) {
+      const auto hit = all.nearest(ray, passed);
+      ASSERT_EQ(hit.triangle, expected.triangle + copy * kCount);
+      EXPECT_EQ(hit.t, expected.t);
+      EXPECT_EQ(hit.front, expected.front);
+      if (copy == 3) ray.own = hit.triangle;  // it may stand anywhere among those that are passed
+      if (copy != 3) passed.push_back(hit.triangle);
+      ++met;
+    }
+    if (!expected.found()) continue;
+    const auto own = std::exchange(ray.own, kNoTriangle);
+    passed.push_back(own);
+    const auto beyond = all.nearest(ray, passed);
+    EXPECT_TRUE(!beyond.found() || beyond.triangle % kCount != expected.triangle);
+  }
+  EXPECT_GT(met, 500U);
+}
+
+/// One copy of all lets nothing pass where its key says so.
+class OneOpaqueCopy final : public SeeThrough {
+ public:
+  [[nodiscard]] bool passes(std::uint32_t triangle, float /*u*/, float /*v*/, std::uint64_t key) const override {
+    return triangle != key;
+  }
+};
+
+TEST(RayScene, EachCopyOfWhatOneCanSeeThroughIsAsked) {
+  const Triangle pane{glm::vec3(-1, 0, -1), glm::vec3(3, 0, -1), glm::vec3(-1, 0, 3)};
+  const auto scene =
+      sceneOf(std::vector<Triangle>(7, pane), std::vector<bool>(7, true), std::make_shared<OneOpaqueCopy>());
+  Ways ways{};
+  for (std::size_t i = 0; i < kPacket; ++i) {
+    ways.origin[1][i] = 1.0F;
+    ways.direction[1][i] = -2.0F;
+    ways.key[i] = i;
+  }
+  EXPECT_EQ(scene.open(ways), 0b10000000U);  // there is no copy 7
+}
+
+TEST(SameTriangles, AreToldFromThoseThatDifferAtAll) {
+  const auto a = soup(1, 3)[0];
+  auto nearly = a;
+  nearly[2].z = std::nextafter(nearly[2].z, 1.0F);
+  const Triangle turned{a[1], a[2], a[0]};
+  EXPECT_TRUE(findSame(std::vector{a, nearly, turned}).next.empty());
+  const auto same = findSame(std::vector{a, nearly, a, turned, a, nearly}, {false, false, false, false, true, false});
+  EXPECT_EQ(same.next, (std::vector{2U, 5U, kNoTriangle, kNoTriangle, kNoTriangle, kNoTriangle}));
+  EXPECT_EQ(same.follows, (std::vector{false, false, true, false, false, true}));
 }
 
 /// The walls of a room of 0.78 units around `middle`, whose corners are rounded there, as a scene in its unit box.

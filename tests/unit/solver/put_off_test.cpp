@@ -67,5 +67,16 @@ TEST(PutOff, measurementsGiveTheSameLight) {
   }
 }
 
+TEST(PutOff, slicesOfWavesGiveTheSameLight) {
+  SolverSettings settings;
+  settings.method = Method::kShooting;
+  settings.target_error = 0.1;
+  test::RayTransport prompt(64);
+  PuttingOff put_off;
+  const auto expected = solved(prompt, settings);
+  EXPECT_EQ(solved(put_off, settings), expected);
+  EXPECT_GT(put_off.calls, 6U);
+}
+
 }  // namespace
 }  // namespace radiosity::solver

@@ -63,5 +63,31 @@ TEST(Png, IsGivenUpOnceItIsCalledOff) {
   EXPECT_THROW((void)encodePng(63, 47, 3, pixelsOf(63, 47, 3)), Interrupted);
 }
 
+/// What a decoder takes is known before it is asked: of a megabyte it may take ten seconds, or a gigabyte.
+TEST(Images, AScanTooManyIsRefused) {
+  const auto jpegOf = [](std::size_t scans) {
+    Bytes jpeg = {0xFF, 0xD8, 0xFF, 0xC2, 0, 11, 8, 0, 64, 0, 64, 1, 1, 0x11, 0};
+    for (std::size_t i = 0; i < scans; ++i) jpeg.insert(jpeg.end(), {0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0x7F});
+    return jpeg;
+  };
+  EXPECT_TRUE(sizeOfImage(jpegOf(256), 1U << 20U, "test"));
+  const auto refused = sizeOfImage(jpegOf(257), 1U << 20U, "test");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(decodeImage(jpegOf(257), 1U << 20U, "test").error().code, ErrorCode::kTooLarge);
+}
+
+TEST(Images, PixelsOfSixteenBitsCountTwice) {
+  const auto pngOf = [](std::uint8_t depth) {
+    return Bytes{0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A,  0, 0, 0, 13, 'I', 'H', 'D', 'R', 0,
+                 0,    0,   100, 0,   0,    0,    100,  depth, 6, 0, 0, 0,  0,   0,   0,   0};
+  };
+  EXPECT_TRUE(sizeOfImage(pngOf(8), 10'000, "test"));
+  EXPECT_TRUE(sizeOfImage(pngOf(16), 20'000, "test"));
+  const auto refused = sizeOfImage(pngOf(16), 19'999, "test");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
+}
+
 }  // namespace
 }  // namespace radiosity::scene

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -304,6 +305,67 @@ TEST(LeafVariation, EvenLightLeavesNothing) {
   EXPECT_EQ(variation.left(), 0.0);
   EXPECT_EQ(variation.noise(), 0.0);
   EXPECT_FALSE(variation.corrects());
+}
+
+/// A cube with a lamp at its top that lights a wall as it might a cornice.
+struct LitCube {
+  test::QuadScene scene = test::makeQuadScene(test::cubeQuads(30, {0, 0, 0, 0, 0, 0}, test::kGrey));
+  std::vector<Side> sides = makeSides(*scene.patches);
+  std::vector<LightPolygon> lamps{1};
+  std::vector<glm::vec3> emission, reflectance, irradiance;
+
+  LitCube() {
+    const std::size_t values = sides.back().first_value + sides.back().leaf_count;
+    emission.assign(values, glm::vec3(0.0F));
+    reflectance.assign(values, glm::vec3(0.5F));
+    irradiance.assign(values, glm::vec3(1.0F));
+    for (std::size_t i = 0; i < values; i += 3) irradiance[i] = glm::vec3(0.1F * static_cast<float>(i % 7));
+    auto& lamp = lamps[0];
+    lamp.corners = {glm::vec3(0.3F, 0.3F, 0.0F), {0.3F, -0.3F, 0.0F}, {-0.3F, -0.3F, 0.0F}, {-0.3F, 0.3F, 0.0F}};
+    lamp.corner_count = 4;
+    lamp.normal = {0.0F, 0.0F, -1.0F};
+    lamp.area = 0.36F;
+  }
+  [[nodiscard]] LeafLight lit(float emitted) {
+    lamps[0].emission = glm::vec3(emitted);
+    return {emission, reflectance, {irradiance, irradiance}, lamps, {}};
+  }
+};
+
+/// How often it had to be called.
+int updateInSlices(LeafVariation& variation, const LeafLight& light) {
+  int slices = 1;
+  while (!variation.update(light, 0.0, 0.0)) ++slices;
+  return slices;
+}
+
+void expectSame(const LeafVariation& one, const LeafVariation& other) {
+  EXPECT_GT(one.corrections().size(), 0U);
+  EXPECT_TRUE(std::ranges::equal(one.corrections(), other.corrections()));
+  EXPECT_EQ(one.left(), other.left());
+  EXPECT_EQ(one.noise(), other.noise());
+  EXPECT_EQ(one.unsettled(), other.unsettled());
+}
+
+TEST(LeafVariation, InSlicesItComesToTheSame) {
+  LitCube cube;
+  LeafVariation whole(*cube.scene.patches, cube.sides, 1), sliced(*cube.scene.patches, cube.sides, 1);
+  whole.update(cube.lit(2.0F), 0.0);
+  EXPECT_GT(updateInSlices(sliced, cube.lit(2.0F)), 2);
+  expectSame(sliced, whole);
+  ASSERT_TRUE(whole.refine() && sliced.refine());
+  whole.update(cube.lit(2.0F), 0.0);
+  EXPECT_GT(updateInSlices(sliced, cube.lit(2.0F)), 0);
+  expectSame(sliced, whole);
+}
+
+TEST(LeafVariation, ALampSwitchedBetweenSlicesIsSeenByAllPaths) {
+  LitCube cube;
+  LeafVariation whole(*cube.scene.patches, cube.sides, 1), sliced(*cube.scene.patches, cube.sides, 1);
+  ASSERT_FALSE(sliced.update(cube.lit(0.0F), 0.0, 0.0));
+  EXPECT_GT(updateInSlices(sliced, cube.lit(2.0F)), 2);
+  whole.update(cube.lit(2.0F), 0.0);
+  expectSame(sliced, whole);
 }
 
 }  // namespace
