@@ -10,7 +10,7 @@
 
 #include "server/scene/document/image_decode.h"
 #include "server/scene/document/json_text.h"
-#include "server/scene/import/scene_memory.h"
+#include "server/scene/document/scene_limit.h"
 
 namespace radiosity::scene {
 namespace {
