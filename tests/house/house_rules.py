@@ -125,6 +125,7 @@ LIBRARY_HOMES = [
     (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
     (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
     (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
+    (r"webp/", "the WebP decoder", ["server/scene/document/", "tests/"]),
     (r"(draco/|meshoptimizer)", "decoders of compressed geometry", ["server/scene/compression/", "tests/"]),
     (r"(gtest|gmock|benchmark)/", "test libraries", ["tests/"]),
     (r"embree\d/", "the ray tracer", ["server/geometry/", "tests/"]),

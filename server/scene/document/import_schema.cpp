@@ -207,8 +207,10 @@ constexpr Member kMaterial[] = {string("name"),
                                 object("extensions", kMaterialExtensions)};
 
 constexpr Member kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", Ref::kBufferViews)};
+constexpr Member kWebp[] = {index("source", Ref::kImages)};
+constexpr Member kTextureExtensions[] = {object("EXT_texture_webp", kWebp)};
 constexpr Member kTexture[] = {string("name"), looseIndex("sampler", Ref::kSamplers),
-                               looseIndex("source", Ref::kImages)};
+                               looseIndex("source", Ref::kImages), object("extensions", kTextureExtensions)};
 constexpr Member kSampler[] = {string("name"), uint("magFilter"), uint("minFilter"), uint("wrapS"), uint("wrapT")};
 constexpr Member kPerspective[] = {number("aspectRatio", 0), req(number("yfov", 0)), number("zfar", 0),
                                    req(number("znear", 0))};
@@ -414,8 +416,9 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 12> kSupported = {"EXT_mesh_gpu_instancing",
+constexpr std::array<std::string_view, 13> kSupported = {"EXT_mesh_gpu_instancing",
                                                          "EXT_meshopt_compression",
+                                                         "EXT_texture_webp",
                                                          "KHR_draco_mesh_compression",
                                                          "KHR_lights_punctual",
                                                          "KHR_materials_emissive_strength",
