@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "client/cli/scene_edits.h"
 #include "protocol/json_rpc.h"
@@ -35,7 +36,11 @@ class Renumber {
 
   [[nodiscard]] std::size_t first(const std::string& array) const { return first_.at(array); }
 
-  void bufferView(Json& view) const { move(view, "buffer", "buffers"); }
+  void bufferView(Json& view) const {
+    move(view, "buffer", "buffers");
+    for (const auto* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
+      if (auto* compressed = extensionOf(view, name)) move(*compressed, "buffer", "buffers");
+  }
   void accessor(Json& accessor) const {
     move(accessor, "bufferView", "bufferViews");
     if (!accessor.contains("sparse")) return;
@@ -46,6 +51,7 @@ class Renumber {
   void texture(Json& texture) const {
     move(texture, "source", "images");
     move(texture, "sampler", "samplers");
+    if (auto* webp = extensionOf(texture, "EXT_texture_webp")) move(*webp, "source", "images");
   }
   /// Textures are named by objects whose member ends in "Texture", in the material and in its extensions.
   void material(Json& value) const {
@@ -62,6 +68,7 @@ class Renumber {
       move(primitive, "material", "materials");
       if (primitive.contains("targets"))
         for (auto& target : primitive["targets"]) moveAll(target, "accessors");
+      if (auto* draco = extensionOf(primitive, "KHR_draco_mesh_compression")) move(*draco, "bufferView", "bufferViews");
     }
   }
   void node(Json& node) const {
@@ -77,6 +84,11 @@ class Renumber {
   }
 
  private:
+  /// Null: there is none.
+  static Json* extensionOf(Json& object, const char* name) {
+    const bool there = object.is_object() && object.contains("extensions") && object["extensions"].contains(name);
+    return there ? &object["extensions"][name] : nullptr;
+  }
   void shift(Json& index, const std::string& array) const {
     if (index.is_number_unsigned()) index = index.get<std::size_t>() + first_.at(array);
   }
@@ -96,8 +108,9 @@ class Merger {
       : scene_(scene), model_(model), bin_uri_(bin_uri), renumber_(scene) {}
 
   Result<Merge> run(const Placement& placement) {
+    bool is_first = true;  // of a GLB only that can be its binary chunk; others without a URI have no data
     append("buffers", [&](Json& buffer) {
-      if (!buffer.contains("uri")) buffer["uri"] = bin_uri_;
+      if (std::exchange(is_first, false) && !buffer.contains("uri")) buffer["uri"] = bin_uri_;
     });
     append("bufferViews", [&](Json& view) { renumber_.bufferView(view); });
     append("accessors", [&](Json& accessor) { renumber_.accessor(accessor); });

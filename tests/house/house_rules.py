@@ -40,7 +40,8 @@ OWN_INCLUDES = [
     ("server/geometry/", GEOMETRY),
     *among("scene", {
         "values": "",
-        "document": "values",
+        "compression": "",
+        "document": "compression values",
         "import": "document values",
         "shading": "values",
         "burial": "values",
@@ -125,6 +126,8 @@ LIBRARY_HOMES = [
     (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
     (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
     (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
+    (r"webp/", "the WebP decoder", ["server/scene/document/", "tests/"]),
+    (r"(draco/|meshoptimizer)", "decoders of compressed geometry", ["server/scene/compression/", "tests/"]),
     (r"(gtest|gmock|benchmark)/", "test libraries", ["tests/"]),
     (r"embree\d/", "the ray tracer", ["server/geometry/", "tests/"]),
 ]

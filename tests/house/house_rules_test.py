@@ -165,6 +165,8 @@ class EachRule(unittest.TestCase):
             ("protocol/a.h", "boost/crc.hpp"), ("server/engine/a.cpp", "nlohmann/json.hpp"),
             ("server/net/a.cpp", "nlohmann/json.hpp"), ("common/a.h", "nlohmann/json_fwd.hpp"),
             ("server/solver/a.cpp", "gtest/gtest.h"), ("server/gpu/a.cpp", "embree3/rtcore.h"),
+            ("server/scene/import/a.cpp", "draco/mesh/mesh.h"), ("server/scene/document/a.cpp", "meshoptimizer.h"),
+            ("server/scene/import/a.cpp", "webp/decode.h"),
         ]:
             self.assertEqual(count(file, header), 1, f"{file} -> {header} must be refused")
         for file, header in [

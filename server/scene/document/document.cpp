@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "server/scene/document/decompress.h"
 #include "server/scene/document/document_defaults.h"
 #include "server/scene/document/document_uri.h"
 #include "server/scene/document/glb.h"
@@ -22,6 +23,7 @@ class Loader {
       : document_(document),
         chunks_(chunks),
         folder_(std::move(folder)),
+        limits_(limits),
         bytes_left_(limits.max_file_bytes),
         image_bytes_left_(limits.max_file_bytes) {}
 
@@ -31,6 +33,8 @@ class Loader {
       if (!bytes) return tl::unexpected(bytes.error());
       document_.buffers.push_back(std::make_shared<const Bytes>(std::move(*bytes)));
     }
+    if (hasCompressedGeometry(document_.gltf))
+      if (auto ok = decompressGeometry(document_, 0, limits_); !ok) return ok;
     for (std::size_t i = 0; i < count("images"); ++i) {
       auto bytes = image(document_.gltf["images"][i], i);
       if (!bytes) return tl::unexpected(bytes.error());
@@ -67,6 +71,7 @@ class Loader {
 
   Result<Bytes> buffer(Json& entry, std::size_t index) {
     const auto length = entry["byteLength"].get<std::size_t>();
+    if (isFallbackBuffer(entry)) return Bytes();
     Result<Bytes> bytes;
     if (entry.contains("uri")) {
       bytes = fetch(entry, at("buffers", index, "/uri"));
@@ -109,6 +114,7 @@ class Loader {
   Document& document_;
   const GlbChunks& chunks_;
   OptionalFolder folder_;
+  const ImportLimits& limits_;
   std::size_t bytes_left_;
   std::size_t image_bytes_left_;
 };

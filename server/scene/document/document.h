@@ -39,7 +39,7 @@ struct Document {
   std::string name;                  ///< for messages: "room.glb"
   nlohmann::json gltf;               ///< defaults materialised, `matrix` turned into TRS (protocol.md)
   std::vector<SharedBytes> buffers;  ///< one for each /buffers entry
-  std::vector<SharedBytes> images;   ///< encoded bytes (PNG, JPEG), one for each /images entry
+  std::vector<SharedBytes> images;   ///< encoded bytes (PNG, JPEG, WebP), one for each /images entry
   /// Of `gltf` as it is, by importEdited(); null: not known, or too large. Whoever changes `gltf` lets it go.
   std::shared_ptr<const ImportRecord> imported = {};
 };

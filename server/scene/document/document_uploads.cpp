@@ -1,5 +1,6 @@
 #include "server/scene/document/document_uploads.h"
 
+#include "server/scene/document/decompress.h"
 #include "server/scene/document/document_uri.h"
 #include "server/scene/document/import_schema.h"
 #include "server/scene/document/json_text.h"
@@ -10,20 +11,28 @@ namespace {
 class Attacher {
  public:
   Attacher(Document& document, const FindUpload& uploads, const ImportLimits& limits)
-      : document_(document), uploads_(uploads), limit_(limits.max_file_bytes) {
+      : document_(document), uploads_(uploads), limits_(limits), limit_(limits.max_file_bytes) {
     for (const auto* list : {&document.buffers, &document.images}) {
       for (const auto& bytes : *list) used_ += bytes->size();
     }
   }
 
   Result<void> run() {
-    if (count("buffers") <= document_.buffers.size() && count("images") <= document_.images.size()) return {};
+    const auto first = document_.buffers.size();
+    const bool compressed = hasCompressedGeometry(document_.gltf);
+    if (count("buffers") <= first && count("images") <= document_.images.size() && !compressed) return {};
     for (auto i = document_.buffers.size(); i < count("buffers"); ++i) {
-      if (auto ok = buffer(document_.gltf["buffers"][i], at("buffers", i)); !ok) return ok;
+      auto& entry = document_.gltf["buffers"][i];
+      const bool is_empty = isFallbackBuffer(entry) || isPlaceForDecoded(document_.gltf, i);
+      auto ok = is_empty ? keep(document_.buffers, std::make_shared<const Bytes>(), at("buffers", i))
+                         : buffer(entry, at("buffers", i));
+      if (!ok) return ok;
     }
     // Images may name buffer views, which nobody has looked at so far.
     std::vector<std::string> warnings;
     if (auto ok = checkSchema(document_.gltf, document_.name, warnings); !ok) return ok;
+    if (compressed)
+      if (auto ok = decompressGeometry(document_, first, limits_); !ok) return ok;
     for (auto i = document_.images.size(); i < count("images"); ++i) {
       if (auto ok = image(document_.gltf["images"][i], at("images", i)); !ok) return ok;
     }
@@ -105,6 +114,7 @@ class Attacher {
 
   Document& document_;
   const FindUpload& uploads_;
+  const ImportLimits& limits_;
   std::size_t limit_, used_ = 0;
 };
 

@@ -9,8 +9,10 @@
 #include <glm/vec2.hpp>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "common/parallel.h"
+#include "server/scene/document/webp.h"
 #include "server/scene/values/shade_texture.h"
 
 namespace radiosity::scene {
@@ -22,6 +24,15 @@ constexpr std::size_t kBytesAThread = std::size_t{1} << 18;
 std::string decoderReason() {
   const char* reason = stbi_failure_reason();
   return reason == nullptr ? "unknown reason" : reason;
+}
+
+Result<std::pair<std::uint32_t, std::uint32_t>> sizeByStb(const Bytes& bytes, const std::string& where) {
+  int width = 0, height = 0, channels = 0;
+  if (stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels) == 0 ||
+      width <= 0 || height <= 0) {
+    return fail(ErrorCode::kBadInput, "image header cannot be read: " + decoderReason(), where);
+  }
+  return std::pair{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
 }
 
 std::uint8_t coded(float value, bool srgb) {
@@ -160,21 +171,19 @@ std::string sniffImageType(const Bytes& bytes) {
   };
   if (starts(kPng)) return "image/png";
   if (starts(kJpeg)) return "image/jpeg";
+  if (isWebp(bytes)) return "image/webp";
   return "";
 }
 
 Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where) {
   // stb_image knows more formats, but glTF does not, and they are the less tested ones.
-  if (sniffImageType(bytes).empty()) return fail(ErrorCode::kUnsupported, "is neither PNG nor JPEG", where);
+  if (sniffImageType(bytes).empty()) return fail(ErrorCode::kUnsupported, "is neither PNG nor JPEG nor WebP", where);
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return fail(ErrorCode::kTooLarge, "image file has more than 2 GiB", where);
   }
-  int width = 0, height = 0, channels = 0;
-  if (stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels) == 0 ||
-      width <= 0 || height <= 0) {
-    return fail(ErrorCode::kBadInput, "image header cannot be read: " + decoderReason(), where);
-  }
-  const ImageSize size{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+  const auto read = isWebp(bytes) ? sizeOfWebp(bytes, where) : sizeByStb(bytes, where);
+  if (!read) return tl::unexpected(read.error());
+  const ImageSize size{read->first, read->second};
   if (const auto scans = scansOfJpeg(bytes); scans > kMostScans) {
     return fail(ErrorCode::kTooLarge,
                 "image has " + std::to_string(scans) + " scans; the limit is " + std::to_string(kMostScans), where);
@@ -182,7 +191,7 @@ Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const 
   if (isDeepPng(bytes)) max_pixels /= 2;
   if (size.pixels() > max_pixels) {
     return fail(ErrorCode::kTooLarge,
-                "image is " + std::to_string(width) + " x " + std::to_string(height) + "; the limit is " +
+                "image is " + std::to_string(size.width) + " x " + std::to_string(size.height) + "; the limit is " +
                     std::to_string(max_pixels) + (isDeepPng(bytes) ? " pixels of 16 bits a channel" : " pixels"),
                 where);
   }
@@ -193,13 +202,17 @@ Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const st
   const auto size = sizeOfImage(bytes, max_pixels, where);
   if (!size) return tl::unexpected(size.error());
   int width = 0, height = 0, channels = 0;
-  std::unique_ptr<stbi_uc, void (*)(void*)> rgba(
-      stbi_load_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels, 4),
-      stbi_image_free);
+  const bool webp = isWebp(bytes);
+  auto rgba =
+      webp ? decodeWebp(bytes, width, height)
+           : std::unique_ptr<stbi_uc, void (*)(void*)>(
+                 stbi_load_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels, 4),
+                 stbi_image_free);
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   // The size is checked again: the header scan and the decoder are two readers of one file.
   if (!rgba || pixels != size->pixels()) {
-    return fail(ErrorCode::kBadInput, "image cannot be decoded: " + decoderReason(), where);
+    return fail(ErrorCode::kBadInput, "image cannot be decoded: " + (webp ? "the WebP is broken" : decoderReason()),
+                where);
   }
   if (use.halvings > 0) {  // what is held is never copied at the size of the file
     auto texture = halved({rgba.get(), width, height, use.srgb});

@@ -1,4 +1,4 @@
-// PNG and JPEG bytes to texels, with a budget that is checked before decoding. Pure; any thread.
+// PNG, JPEG and WebP bytes to texels, with a budget that is checked before decoding. Pure; any thread.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace radiosity::scene {
 
-/// "image/png", "image/jpeg", or "" for anything else, from the first bytes.
+/// "image/png", "image/jpeg", "image/webp", or "" for anything else, from the first bytes.
 [[nodiscard]] std::string sniffImageType(const Bytes& bytes);
 
 struct ImageSize {
@@ -25,7 +25,7 @@ struct ImageSize {
   }
 };
 /// From the header. kTooLarge: more than `max_pixels`, of 16 bits a channel half as many, or more scans than any honest
-/// JPEG has; kUnsupported and kBadInput: it is no PNG or JPEG.
+/// JPEG has; kUnsupported and kBadInput: it is no PNG, JPEG or WebP.
 [[nodiscard]] Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where);
 
 /// How a picture is held.

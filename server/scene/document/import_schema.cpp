@@ -112,13 +112,27 @@ constexpr std::string_view kCameraTypes[] = {"perspective", "orthographic"};
 constexpr std::string_view kLightTypes[] = {"point", "spot", "directional"};
 
 constexpr Member kAsset[] = {req(string("version")), string("minVersion"), string("generator"), string("copyright")};
-constexpr Member kBuffer[] = {string("name"), string("uri"), req(uint("byteLength", 1))};
+constexpr Member kFallback[] = {boolean("fallback")};
+constexpr Member kBufferExtensions[] = {object("EXT_meshopt_compression", kFallback),
+                                        object("KHR_meshopt_compression", kFallback)};
+constexpr Member kBuffer[] = {string("name"), string("uri"), req(uint("byteLength", 1)),
+                              object("extensions", kBufferExtensions)};
+constexpr Member kMeshopt[] = {req(index("buffer", Ref::kBuffers)),
+                               uint("byteOffset"),
+                               req(uint("byteLength", 1)),
+                               req(uint("byteStride", 1, 256)),
+                               req(uint("count", 1)),
+                               req(string("mode")),
+                               string("filter")};
+constexpr Member kBufferViewExtensions[] = {object("EXT_meshopt_compression", kMeshopt),
+                                            object("KHR_meshopt_compression", kMeshopt)};
 constexpr Member kBufferView[] = {string("name"),
                                   req(index("buffer", Ref::kBuffers)),
                                   uint("byteOffset"),
                                   req(uint("byteLength", 1)),
                                   uint("byteStride", 4, 252),
-                                  uint("target")};
+                                  uint("target"),
+                                  object("extensions", kBufferViewExtensions)};
 constexpr Member componentType() { return req(uint("componentType", 5120, 5126)); }
 constexpr Member kSparseIndices[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset"), componentType()};
 constexpr Member kSparseValues[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset")};
@@ -134,9 +148,12 @@ constexpr Member kAccessor[] = {string("name"),
                                 object("sparse", kSparse),
                                 numbers("min", 0),
                                 numbers("max", 0)};
-constexpr Member kPrimitive[] = {req(indexMap("attributes", Ref::kAccessors)), index("indices", Ref::kAccessors),
-                                 index("material", Ref::kMaterials), uint("mode", 0, 6),
-                                 indexMaps("targets", Ref::kAccessors)};
+constexpr Member kDraco[] = {req(index("bufferView", Ref::kBufferViews)), req(indexMap("attributes", Ref::kCount))};
+constexpr Member kPrimitiveExtensions[] = {object("KHR_draco_mesh_compression", kDraco)};
+constexpr Member kPrimitive[] = {
+    req(indexMap("attributes", Ref::kAccessors)), index("indices", Ref::kAccessors),
+    index("material", Ref::kMaterials),           uint("mode", 0, 6),
+    indexMaps("targets", Ref::kAccessors),        object("extensions", kPrimitiveExtensions)};
 constexpr Member kMesh[] = {string("name"), req(objects("primitives", kPrimitive)),
                             numbers("weights", 0, -kMostWeight, kMostWeight)};
 
@@ -190,8 +207,10 @@ constexpr Member kMaterial[] = {string("name"),
                                 object("extensions", kMaterialExtensions)};
 
 constexpr Member kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", Ref::kBufferViews)};
+constexpr Member kWebp[] = {index("source", Ref::kImages)};
+constexpr Member kTextureExtensions[] = {object("EXT_texture_webp", kWebp)};
 constexpr Member kTexture[] = {string("name"), looseIndex("sampler", Ref::kSamplers),
-                               looseIndex("source", Ref::kImages)};
+                               looseIndex("source", Ref::kImages), object("extensions", kTextureExtensions)};
 constexpr Member kSampler[] = {string("name"), uint("magFilter"), uint("minFilter"), uint("wrapS"), uint("wrapT")};
 constexpr Member kPerspective[] = {number("aspectRatio", 0), req(number("yfov", 0)), number("zfar", 0),
                                    req(number("znear", 0))};
@@ -397,15 +416,19 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 9> kSupported = {"EXT_mesh_gpu_instancing",
-                                                        "KHR_lights_punctual",
-                                                        "KHR_materials_emissive_strength",
-                                                        "KHR_materials_pbrSpecularGlossiness",
-                                                        "KHR_materials_transmission",
-                                                        "KHR_materials_unlit",
-                                                        "KHR_mesh_quantization",
-                                                        "KHR_node_visibility",
-                                                        "KHR_texture_transform"};
+constexpr std::array<std::string_view, 13> kSupported = {"EXT_mesh_gpu_instancing",
+                                                         "EXT_meshopt_compression",
+                                                         "EXT_texture_webp",
+                                                         "KHR_draco_mesh_compression",
+                                                         "KHR_lights_punctual",
+                                                         "KHR_materials_emissive_strength",
+                                                         "KHR_materials_pbrSpecularGlossiness",
+                                                         "KHR_materials_transmission",
+                                                         "KHR_materials_unlit",
+                                                         "KHR_mesh_quantization",
+                                                         "KHR_meshopt_compression",
+                                                         "KHR_node_visibility",
+                                                         "KHR_texture_transform"};
 
 bool isSupported(const std::string& extension) {
   return std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();

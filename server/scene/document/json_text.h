@@ -29,4 +29,12 @@ using Json = nlohmann::json;
 /// "room.glb: /accessors/4".
 [[nodiscard]] std::string place(const std::string& name, std::string_view pointer);
 
+/// An extension object of a checked JSON object, or null.
+[[nodiscard]] inline const Json* extensionOf(const Json& object, const char* name) {
+  const auto extensions = object.find("extensions");
+  if (extensions == object.end()) return nullptr;
+  const auto found = extensions->find(name);
+  return found == extensions->end() ? nullptr : &*found;
+}
+
 }  // namespace radiosity::scene

@@ -10,7 +10,8 @@
 
 #include "server/scene/document/image_decode.h"
 #include "server/scene/document/json_text.h"
-#include "server/scene/import/scene_memory.h"
+#include "server/scene/document/scene_limit.h"
+#include "server/scene/import/texture_references.h"
 
 namespace radiosity::scene {
 namespace {
@@ -47,9 +48,8 @@ void markUsed(const Json& value, const Json& textures, std::vector<std::uint8_t>
     const auto index = child.is_object() ? child.find("index") : child.end();
     if (std::ranges::find(kUsed, key) != kUsed.end() && child.is_object() && index != child.end()) {
       const auto texture = indexOf(*index, textures.size());
-      if (texture >= textures.size() || !textures[texture].contains("source")) continue;
-      const auto image = indexOf(textures[texture]["source"], used.size());
-      if (image < used.size()) used[image] |= useOf(key);
+      if (texture >= textures.size()) continue;
+      if (const auto image = imageReferenceOf(textures[texture], used.size())) used[*image] |= useOf(key);
     } else {
       markUsed(child, textures, used);
     }

@@ -112,20 +112,6 @@ Result<void> checkSkins(const ImportContext& context) {
   return {};
 }
 
-/// Draco and meshopt data can stand where we would read zeros; refuse that by name rather than draw nothing.
-Result<void> checkCompression(const ImportContext& context, const tinygltf::Primitive& primitive, const Json& json,
-                              const std::string& pointer) {
-  if (extensionOf(json, "KHR_draco_mesh_compression") == nullptr) return {};
-  for (const auto& [name, index] : primitive.attributes) {
-    if (viewOf(context.model, context.model.accessors[static_cast<std::size_t>(index)].bufferView) == nullptr) {
-      return fail(ErrorCode::kUnsupported,
-                  "geometry is only there as KHR_draco_mesh_compression, which is not supported; export without it",
-                  place(context.document.name, pointer + "/extensions/KHR_draco_mesh_compression"));
-    }
-  }
-  return {};
-}
-
 Result<void> checkIndices(const ImportContext& context, const tinygltf::Primitive& primitive,
                           const std::string& pointer) {
   if (primitive.indices < 0) return {};
@@ -145,8 +131,6 @@ Result<void> checkMeshes(const ImportContext& context) {
     for (std::size_t p = 0; p < primitives.size(); ++p) {
       interruptionPoint();
       const auto pointer = "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p);
-      const auto& json = context.document.gltf["meshes"][m]["primitives"][p];
-      if (auto ok = checkCompression(context, primitives[p], json, pointer); !ok) return ok;
       if (auto ok = checkAttributes(context, primitives[p], pointer); !ok) return ok;
       if (auto ok = checkTargets(context, primitives[p], pointer); !ok) return ok;
       if (auto ok = checkIndices(context, primitives[p], pointer); !ok) return ok;

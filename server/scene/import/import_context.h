@@ -34,12 +34,4 @@ struct ImportContext {
   }
 };
 
-/// An extension object of a checked JSON object, or null.
-[[nodiscard]] inline const Json* extensionOf(const Json& object, const char* name) {
-  const auto extensions = object.find("extensions");
-  if (extensions == object.end()) return nullptr;
-  const auto found = extensions->find(name);
-  return found == extensions->end() ? nullptr : &*found;
-}
-
 }  // namespace radiosity::scene

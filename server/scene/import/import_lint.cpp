@@ -162,7 +162,7 @@ void warnImages(ImportContext& context) {
     const auto pointer = "/images/" + std::to_string(i);
     const auto said = context.document.gltf["images"][i].value("mimeType", type);
     if (type.empty()) {
-      context.warn(pointer, "is neither PNG nor JPEG");
+      context.warn(pointer, "is neither PNG nor JPEG nor WebP");
     } else if (said != type) {
       context.warn(pointer + "/mimeType", "says " + said + ", but the data is " + type);
     }

@@ -184,10 +184,10 @@ class MaterialImporter {
 
   /// The image of a texture that is used; without one there is no texture, with a warning.
   std::optional<std::size_t> imageOf(const Json& texture, const std::string& where) {
-    const auto image = referenceOf(texture, "source", context_.document.images.size());
+    const auto image = imageReferenceOf(texture, context_.document.images.size());
     if (!warned_.insert(where).second) return image;
-    if (!texture.contains("source")) context_.warn(where, "has no source that we can read; white is used");
-    warnDanglingReference(texture, "source", "images", where, "the texture is left out");
+    if (!image && !texture.contains("source")) context_.warn(where, "has no source that we can read; white is used");
+    if (!image) warnDanglingReference(texture, "source", "images", where, "the texture is left out");
     warnDanglingReference(texture, "sampler", "samplers", where, "the texture repeats and is filtered linearly");
     return image;
   }

@@ -1,14 +1,12 @@
 #include "server/scene/import/scene_memory.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "common/memory_limit.h"
+#include "server/scene/document/scene_limit.h"
 #include "server/scene/import/import_context.h"
 
 namespace radiosity::scene {
@@ -21,19 +19,10 @@ constexpr std::uint64_t kNodeBytes = 3'000, kMaterialBytes = 9'000, kMeshBytes =
 constexpr std::uint64_t kTriangleBytes = 900, kInstanceBytes = 1'000;
 /// The same in each process that draws: of a triangle a fifth is what Embree makes of it, at its peak.
 constexpr std::uint64_t kDrawnTriangleBytes = 850, kDrawnInstanceBytes = 300;
-/// Unless a limit is named a scene may claim so much of its server, and so much for each byte of data: a kilobyte can
-/// place a million triangles in one place, which nobody wants to see, and no model of some size comes near.
-constexpr std::uint64_t kLikelyBytes = std::uint64_t{512} << 20, kLikelyBytesAByte = 128;
 constexpr std::uint64_t kEntryBytes = 16;     ///< of JSON, at least, that places something
 constexpr std::uint64_t kElementBytes = 240;  ///< of EXT_mesh_gpu_instancing: transform and instance
 /// A vertex as it is read, with maps that find doubled triangles; its attributes; a corner of a triangle.
 constexpr std::uint64_t kVertexBytes = 36, kCornerBytes = 40;
-
-std::string inUnits(std::uint64_t bytes) {
-  constexpr double kMib = 1048576.0, kGib = 1024.0 * kMib;
-  const auto size = static_cast<double>(bytes);
-  return size >= kGib ? fmt::format("{:.1f} GiB", size / kGib) : fmt::format("{:.1f} MiB", size / kMib);
-}
 
 /// Never wraps round: claims are products of what a file says.
 std::uint64_t times(std::uint64_t a, std::uint64_t b) {
@@ -50,7 +39,7 @@ class GeometryClaim {
   GeometryClaim(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
                 const ImportLimits& limits)
       : document_(document), model_(model), limits_(limits), limit_(sceneMemoryLimit(limits)), bytes_(claimed) {
-    if (limits.max_scene_bytes == 0) likely_ = kLikelyBytes + kLikelyBytesAByte * bytesOfData();
+    likely_ = likelySceneBytes(limits, bytesOfData());
     for (const auto& mesh : model.meshes) {
       MeshClaim claim;
       for (const auto& primitive : mesh.primitives) add(primitive, claim);
@@ -161,15 +150,6 @@ class GeometryClaim {
 };
 
 }  // namespace
-
-std::uint64_t sceneMemoryLimit(const ImportLimits& limits) {
-  return limits.max_scene_bytes != 0 ? limits.max_scene_bytes : memoryLimitBytes() / 2;
-}
-
-std::string sceneMemoryFault(std::uint64_t bytes, std::uint64_t limit, std::string_view what) {
-  return fmt::format("with {} the scene would take {} or more; --max-scene-memory allows {}", what, inUnits(bytes),
-                     inUnits(limit));
-}
 
 Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits) {
   const auto& gltf = document.gltf;

@@ -3,20 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <string_view>
 
 #include "server/scene/document/document.h"
 #include "server/scene/import/import_model.h"
 
 namespace radiosity::scene {
-
-/// ImportLimits::max_scene_bytes, or what it is where it is 0: half of the memory there is.
-[[nodiscard]] std::uint64_t sceneMemoryLimit(const ImportLimits& limits);
-
-/// "the scene would take 8.0 GiB, more than the 5.8 GiB that --max-scene-memory allows (...)". `what`: what brings the
-/// sum above the limit.
-[[nodiscard]] std::string sceneMemoryFault(std::uint64_t bytes, std::uint64_t limit, std::string_view what);
 
 /// Bytes that parsing takes, about: entries of the JSON's lists. kTooLarge: they are more than the limit. O(meshes).
 [[nodiscard]] Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits);

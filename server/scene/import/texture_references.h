@@ -24,6 +24,14 @@ namespace radiosity::scene {
   return found == gltf.end() ? 0 : found->size();
 }
 
+/// The image of a texture, of `count` that there are: that which EXT_texture_webp names, or else its `source`; none,
+/// too, where there is no such image.
+[[nodiscard]] inline std::optional<std::size_t> imageReferenceOf(const Json& texture, std::size_t count) {
+  const auto* webp = extensionOf(texture, "EXT_texture_webp");
+  const auto image = webp != nullptr ? referenceOf(*webp, "source", count) : std::nullopt;
+  return image ? image : referenceOf(texture, "source", count);
+}
+
 /// Calls visit(owner, key, where) for each texture info of a material and its extensions, also of textures that light
 /// does not need: it is owner[key], and `where` its JSON pointer. The call may erase it. `value`: the material, at
 /// `pointer`; values nest at most 64 deep.

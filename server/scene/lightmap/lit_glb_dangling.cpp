@@ -15,7 +15,7 @@ void dropDanglingTextures(Json& gltf) {
     if (texture.contains("sampler") && !referenceOf(texture, "sampler", samplers)) texture.erase("sampler");
     if (!texture.contains("source") || referenceOf(texture, "source", images)) continue;
     texture.erase("source");
-    there[t] = false;
+    there[t] = imageReferenceOf(texture, images).has_value();
   }
   if (!gltf.contains("materials")) return;
   for (auto& material : gltf["materials"]) {

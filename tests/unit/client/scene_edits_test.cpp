@@ -172,6 +172,29 @@ TEST(ModelMerge, everyIndexMovesAlong) {
   EXPECT_EQ(gltf["extensionsUsed"], Json::parse(R"(["KHR_x"])"));
 }
 
+TEST(ModelMerge, indicesOfCompressedDataMoveAlongToo) {
+  const auto model = Json::parse(R"({
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "extensions": {"KHR_draco_mesh_compression":
+               {"bufferView": 0, "attributes": {"POSITION": 5}}}}]}],
+    "textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}], "images": [{"bufferView": 1}],
+    "accessors": [{}],
+    "bufferViews": [{"buffer": 0}, {"buffer": 1, "extensions": {"EXT_meshopt_compression": {"buffer": 0}}}],
+    "buffers": [{"byteLength": 8}, {"byteLength": 9}]})");
+  auto gltf = document();
+  gltf["images"] = Json::array({Json::object()});
+  const auto merge = mergeModel(gltf, model, "/uploads/u", {"x", {}, {}});
+  ASSERT_TRUE(merge) << merge.error().text();
+  ASSERT_NO_THROW(gltf = gltf.patch(merge->patch)) << merge->patch;
+  const auto& draco = gltf["meshes"][1]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"];
+  EXPECT_EQ(draco, Json::parse(R"({"bufferView":1,"attributes":{"POSITION":5}})"));
+  EXPECT_EQ(gltf["bufferViews"][2]["extensions"]["EXT_meshopt_compression"]["buffer"], 1);
+  EXPECT_EQ(gltf["bufferViews"][2]["buffer"], 2);
+  EXPECT_EQ(gltf["textures"][0]["extensions"]["EXT_texture_webp"]["source"], 1);
+  EXPECT_EQ(gltf["buffers"][1]["uri"], "/uploads/u");
+  EXPECT_FALSE(gltf["buffers"][2].contains("uri")) << "it has no data";
+}
+
 TEST(ModelMerge, aFileThatIsNotWhatItSeemsIsRefused) {
   for (const auto* model :
        {R"({})", R"({"nodes":5})", R"({"nodes":[7]})", R"({"nodes":[{"children":"x"}]})",

@@ -18,6 +18,7 @@ using Json = nlohmann::json;
 struct GltfBuilder {
   Json gltf = {{"asset", {{"version", "2.0"}}}};
   Bytes bin;
+  Json extra_buffers = Json::array();  ///< behind that of `bin`
 
   template <typename T>
   std::size_t accessor(const std::vector<T>& values, int component_type, const std::string& type,
@@ -51,6 +52,7 @@ struct GltfBuilder {
   [[nodiscard]] Bytes glb() const {
     auto json = gltf;
     if (!bin.empty()) json["buffers"] = Json::array({{{"byteLength", bin.size()}}});
+    for (const auto& buffer : extra_buffers) json["buffers"].push_back(buffer);
     return joinGlb(json.dump(), bin);
   }
   [[nodiscard]] Result<Document> document() const { return parseDocument("test.glb", glb()); }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/memory_limit.h"
+#include "server/scene/document/scene_limit.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene::test {

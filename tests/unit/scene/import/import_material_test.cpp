@@ -96,6 +96,31 @@ TEST(ImportMaterial, texturesAreDecodedWithTheirTransformAndWrap) {
   EXPECT_FALSE(imported(builder).materials[0].metallic_texture.nearest);
 }
 
+TEST(ImportMaterial, theTransformOfEveryTextureThatIsReadCounts) {
+  const auto info = [](double offset) {
+    return Json{{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"offset", {offset, 0}}, {"texCoord", 1}}}}}};
+  };
+  GltfBuilder builder;
+  builder.gltf["images"] = Json::array({{{"uri", kPng}}});
+  builder.gltf["textures"] = Json::array({{{"source", 0}}});
+  builder.gltf["extensionsRequired"] = {"KHR_texture_transform"};
+  builder.gltf["materials"] =
+      Json::array({{{"emissiveFactor", {1, 1, 1}},
+                    {"emissiveTexture", info(1)},
+                    {"pbrMetallicRoughness", {{"baseColorTexture", info(2)}, {"metallicRoughnessTexture", info(3)}}}},
+                   {{"extensions",
+                     {{"KHR_materials_pbrSpecularGlossiness",
+                       {{"diffuseTexture", info(4)}, {"specularGlossinessTexture", info(5)}}}}}}});
+  const auto materials = imported(builder).materials;
+  const auto& specular = materials.at(1);
+  int expected = 1;
+  for (const auto* use : {&materials[0].emissive_texture, &materials[0].base_color_texture,
+                          &materials[0].metallic_texture, &specular.base_color_texture, &specular.specular_texture}) {
+    EXPECT_EQ(use->offset, glm::vec2(static_cast<float>(expected++), 0.0F));
+    EXPECT_EQ(use->texcoord, 1);
+  }
+}
+
 // 1 pixel, whose blue is 51 of 255.
 constexpr const char* kBlue51 =
     "data:image/"
