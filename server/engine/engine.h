@@ -88,7 +88,8 @@ struct SolveSettings {
   std::optional<double> time_limit_s;  ///< solve time
   std::uint64_t texels = 24'000;       ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
-  /// `texels` are the most there may be: as few are made, finer where light wants it, as meet the target at the surface.
+  /// `texels` are the most there may be: as few are made, finer where light wants it, as meet the target at the
+  /// surface.
   bool adaptive = false;
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own

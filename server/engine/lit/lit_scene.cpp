@@ -18,8 +18,8 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
-/// Where the program chooses texels it looks at so many first, to so much of an error; and of the error asked for, whose
-/// square is that of both, so much may be the solver's and so much that of texels.
+/// Where the program chooses texels it looks at so many first, to so much of an error; and of the error asked for,
+/// whose square is that of both, so much may be the solver's and so much that of texels.
 constexpr std::uint64_t kPilotTexels = 16'000;
 constexpr double kPilotError = 0.03, kSolversPart = 0.5, kTexelsPart = 0.82;
 /// One layout has at most so many times as many texels as the one before, which tells too little of more.
@@ -76,8 +76,7 @@ Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, 
 
 Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, const SolveSettings& settings,
                                                       solver::Transport& transport, const scene::SideBits& sides,
-                                                      std::vector<float> detail,
-                                                      const scene::ImportLimits& limits) {
+                                                      std::vector<float> detail, const scene::ImportLimits& limits) {
   auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   configureScene(*imported, settings);
@@ -461,8 +460,9 @@ std::vector<glm::vec3> LitScene::ownLight() const {
 
 void LitScene::probeSurface(double seconds) {
   const auto irradiance = ownLight();
-  surface_probe_.advance({*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
-                         [this] { return pages(); }, seconds);
+  surface_probe_.advance(
+      {*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
+      [this] { return pages(); }, seconds);
 }
 
 std::vector<scene::LightmapPage> LitScene::pages() const { return scene::assemblePages(*patches_, ownLight()); }

@@ -51,12 +51,9 @@ class LitScene {
 
   /// As another process made it of this document, to restore() its solve: with these sides(), whatever its lamps were
   /// when it was laid out. kBadInput: the scene cannot have had them.
-  [[nodiscard]] static Result<std::unique_ptr<LitScene>> makeAgain(scene::Document document,
-                                                                   const SolveSettings& settings,
-                                                                   solver::Transport& transport,
-                                                                   const scene::SideBits& sides,
-                                                                   std::vector<float> detail,
-                                                                   const scene::ImportLimits& limits = {});
+  [[nodiscard]] static Result<std::unique_ptr<LitScene>> makeAgain(
+      scene::Document document, const SolveSettings& settings, solver::Transport& transport,
+      const scene::SideBits& sides, std::vector<float> detail, const scene::ImportLimits& limits = {});
 
   /// Whether makeAgain() gives the same charts, so that a saved solve fits them. One whose charts stayed where a former
   /// scene had them is its own.
@@ -189,8 +186,8 @@ class LitScene {
   void forgetSurface() { surface_probe_.forget(); }
   /// Nothing: it is not measured.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
-  /// Where the program chooses texels: these are not enough, and tell where others are to be finer. Before startSolve().
-  /// `error`: that is likely to be left by texels; light need not be known much better.
+  /// Where the program chooses texels: these are not enough, and tell where others are to be finer. Before
+  /// startSolve(). `error`: that is likely to be left by texels; light need not be known much better.
   void setDraft(double error) { draft_error_ = error; }
   [[nodiscard]] bool isDraft() const { return draft_error_ > 0.0; }
   /// Once surfaceError() is there: how fine texels should be for the target, by surface, as make() takes it.
@@ -255,8 +252,8 @@ class LitScene {
   SurfaceProbe surface_probe_;
   bool stale_ = false;
   bool reproducible_ = true;
-  bool has_detail_ = false;  // texels are finer here than there
-  double draft_error_ = 0.0;  // and these are to be replaced; 0: they are not
+  bool has_detail_ = false;                    // texels are finer here than there
+  double draft_error_ = 0.0;                   // and these are to be replaced; 0: they are not
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                 // that the solver knows of

@@ -272,8 +272,8 @@ void SolveLoop::catchUp() {
 }
 
 bool SolveLoop::probesSurface() const {
-  const bool is_solved = state_ == SolveState::kConverged || state_ == SolveState::kLimited ||
-                         state_ == SolveState::kTimeLimit;
+  const bool is_solved =
+      state_ == SolveState::kConverged || state_ == SolveState::kLimited || state_ == SolveState::kTimeLimit;
   return is_solved && lit_ && !lit_->isStale() && !lit_->surfaceError() && !isBehind();
 }
 

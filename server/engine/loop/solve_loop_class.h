@@ -1,8 +1,8 @@
 // The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in nine files: solve_loop.cpp
 // runs the thread, solve_loop_load.cpp takes in scenes, solve_loop_edits.cpp changes scene and settings,
 // solve_loop_answers.cpp makes what can be fetched, solve_loop_publish.cpp shows lightmaps to those who watch,
-// solve_loop_refine.cpp chooses texels, solve_loop_state.cpp keeps what outlives the process, solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp
-// goes on when renderers are lost.
+// solve_loop_refine.cpp chooses texels, solve_loop_state.cpp keeps what outlives the process, solve_loop_restore.cpp
+// brings it back, solve_loop_recovery.cpp goes on when renderers are lost.
 #pragma once
 
 #include <array>
@@ -316,7 +316,7 @@ class SolveLoop final : public Engine {
   Upkeep upkeep_;
   std::optional<Refinement> refinement_;  // of the solve under way
   int refined_times_ = 0;                 // since the scene was loaded or edited
-  std::size_t lost_told_ = 0;  // warnings of lost light that were logged since the load: edits log no others
+  std::size_t lost_told_ = 0;             // warnings of lost light that were logged since the load: edits log no others
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
   std::atomic<bool> waiting_{true};

@@ -63,10 +63,10 @@ void SolveLoop::orderRefined() {
     return endSolve(otherwise == SolveState::kConverged ? SolveState::kLimited : otherwise);
   }
   try {
-    const bool suffices = wanted.error <= settings_.target_error ||
-                          wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
+    const bool suffices =
+        wanted.error <= settings_.target_error || wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
     RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.of_surface),
-                              suffices ? 0.0 : wanted.error};
+                           suffices ? 0.0 : wanted.error};
     refinement_->job = std::make_unique<RefineJob>(std::move(order), *transport_, [this] { queue_.wake(); });
     refinement_->ordered = Clock::now();
   } catch (const std::system_error& error) {

@@ -24,14 +24,15 @@ struct CheckpointHead {
   Method method = Method::kGather;
   bool has_sky = false, double_sided = false, adaptive = false;
   SkySetting sky;
-  std::string gltf, assets;  ///< JSON, and a digest of buffers and images
-  scene::SideBits sides;     ///< LitScene::sides()
+  std::string gltf, assets;   ///< JSON, and a digest of buffers and images
+  scene::SideBits sides;      ///< LitScene::sides()
   std::vector<float> detail;  ///< LitScene::detail()
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
-            self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.adaptive, self.gltf, self.assets, self.sides, self.detail);
+            self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.adaptive, self.gltf, self.assets,
+            self.sides, self.detail);
   }
 };
 

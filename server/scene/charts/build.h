@@ -24,7 +24,7 @@ struct ChartOptions {
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
   /// By surface of the same scene, built with the same other options: how many times as fine as others its texels are
   /// (Surface::detail). Empty: all are alike. It adds to the budget, or takes from it.
-  std::vector<float> detail;
+  std::vector<float> detail = {};
 };
 
 /// A scene as it was before an edit. Refers to its parts.

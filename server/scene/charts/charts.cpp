@@ -264,8 +264,7 @@ class Builder {
     return former;
   }
 
-  /// What an edit left alone keeps the texels that it has. Islands of a layout that is kept come nearer to each other
-  /// with coarser ones, so that none get those.
+  /// What an edit left alone keeps the texels that it has.
   void shareDetail() {
     const auto former = formerSurfaces();
     const bool given = former_ == nullptr && options_.detail.size() == charts_.size();
@@ -273,17 +272,7 @@ class Builder {
       if (former[c] != nullptr) charts_[c].detail = static_cast<double>(former[c]->detail);
       if (given) charts_[c].detail = static_cast<double>(options_.detail[c]);
     }
-    for (std::size_t first = 0, end = 0; first < charts_.size(); first = end) {
-      double texels = 0.0, area = 0.0;  // as many in all as if each had its own
-      for (; end < charts_.size() && charts_[end].instance == charts_[first].instance; ++end) {
-        if (!charts_[end].from_file) continue;
-        texels += charts_[end].area * charts_[end].detail * charts_[end].detail;
-        area += charts_[end].area;
-      }
-      const double shared = area > 0.0 ? std::max(1.0, std::sqrt(texels / area)) : 1.0;
-      for (auto c = first; c < end; ++c)
-        if (charts_[c].from_file) charts_[c].detail = shared;
-    }
+    shareDetailOfLayouts(charts_);
   }
 
   [[nodiscard]] FormerPlaces formerPlaces() const {

@@ -110,6 +110,10 @@ struct Facets {
                                                          const std::vector<Chart>& charts, double texel,
                                                          const ChartOptions& options);
 
+/// Charts of a file's own layout get texels alike, as many in all as if each had its own Chart::detail. None get
+/// coarser ones: islands would come nearer to each other. `charts`: those of an instance lie together.
+void shareDetailOfLayouts(std::vector<Chart>& charts);
+
 /// Charts whose sides are chosen, and what they are made of. Refers to its parts; those that are turned around are
 /// turned in `flat`, too.
 struct SidedCharts {

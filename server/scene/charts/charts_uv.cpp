@@ -129,4 +129,18 @@ std::vector<Chart> uvCharts(const Scene& scene, const FlatScene& flat, const std
   return charts;
 }
 
+void shareDetailOfLayouts(std::vector<Chart>& charts) {
+  for (std::size_t first = 0, end = 0; first < charts.size(); first = end) {
+    double texels = 0.0, area = 0.0;
+    for (; end < charts.size() && charts[end].instance == charts[first].instance; ++end) {
+      if (!charts[end].from_file) continue;
+      texels += charts[end].area * charts[end].detail * charts[end].detail;
+      area += charts[end].area;
+    }
+    const double shared = area > 0.0 ? std::max(1.0, std::sqrt(texels / area)) : 1.0;
+    for (auto c = first; c < end; ++c)
+      if (charts[c].from_file) charts[c].detail = shared;
+  }
+}
+
 }  // namespace radiosity::scene

@@ -205,8 +205,8 @@ glm::dvec3 PlaceLight::fromSomeLamps(const Spot& spot, std::uint64_t key) const 
     const double arrives = glm::dot(place.normal, way) > 0.0 ? glm::dot(spot.shading, way) : 0.0;
     if (!(arrives > 0.0 && leaves > 0.0)) continue;
     if (!isOpen(place, point, glm::dvec3(lamp.normal), mixKeys(key, k))) continue;
-    sum += lamp.area * arrives * leaves / (std::numbers::pi * square * square * drawn.chance) *
-           glm::dvec3(lamp.emission);
+    sum +=
+        lamp.area * arrives * leaves / (std::numbers::pi * square * square * drawn.chance) * glm::dvec3(lamp.emission);
   }
   return sum / static_cast<double>(kDraws);
 }

@@ -96,7 +96,8 @@ SurfaceErrorParts SurfaceError::stated() const {
   if (!(light > 0.0)) return parts;
   parts.total = std::sqrt(std::max(0.0, wrong) / light);
   const double deviation = std::sqrt(std::max(0.0, squares - wrong * wrong / count)) / light;
-  parts.deviation = parts.total > 0.0 ? std::min(std::sqrt(deviation), 0.5 * deviation / parts.total) : std::sqrt(deviation);
+  parts.deviation =
+      parts.total > 0.0 ? std::min(std::sqrt(deviation), 0.5 * deviation / parts.total) : std::sqrt(deviation);
   std::vector<double> off;
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const auto true_light = 0.5 * (true_[i][0] + true_[i][1]);

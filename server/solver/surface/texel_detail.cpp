@@ -209,7 +209,9 @@ class DetailChooser {
   [[nodiscard]] static double detailAt(const Need& need, double gain) {
     if (need.texels <= 0.0) return 1.0;
     const double coarsest = need.texels >= kFewTexels ? kCoarsest : 1.0;
-    const auto with = [&](double power) { return std::pow(gain * power * need.error / need.texels, 1.0 / (power + 2.0)); };
+    const auto with = [&](double power) {
+      return std::pow(gain * power * need.error / need.texels, 1.0 / (power + 2.0));
+    };
     const double finer = with(need.power);
     return finer >= 1.0 ? std::min(finer, kFinest) : std::clamp(with(kEvenPower), coarsest, 1.0);
   }

@@ -27,8 +27,8 @@ struct TexelDetail {
   double texels = 0.0;            ///< that surfaces have then, about
 };
 
-/// `first`, `second`: irradiance by node, of the two independent halves. `measured`: at the surface, with the texels that
-/// there are. Cost: some passes over the leaves.
+/// `first`, `second`: irradiance by node, of the two independent halves. `measured`: at the surface, with the texels
+/// that there are. Cost: some passes over the leaves.
 [[nodiscard]] TexelDetail chooseDetail(const scene::PatchScene& patches, std::span<const glm::vec3> first,
                                        std::span<const glm::vec3> second,
                                        std::span<const SurfaceError::Measured> measured, const DetailGoal& goal);

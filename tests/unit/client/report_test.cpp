@@ -46,6 +46,8 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
 TEST(OutcomeText, saysThatTexelsAreTooLargeOnlyWhereTheyAreWhatLimits) {
   EXPECT_EQ(surfaceText({0.0142, 0.004, 0.0137, 0.001, 0.0381}), "; finer texels would change 3.81 %");
   EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.003, 0.002}), "");
+  EXPECT_EQ(surfaceText({0.0142, 0.004, 0.0137, 0.001, 0.0381, 0.0637, 0.202}),
+            "; 6.37 % at the surface, 95 % of places within 20.2 %");
   EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.0, std::nan("")}), "");
 }
 

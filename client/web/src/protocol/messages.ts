@@ -46,7 +46,16 @@ export interface Progress {
   shotsPerSecond: number;
   seconds: number;
   secondsLeft?: number;
-  error: { total: number; residual: number; sampling: number; variation?: number; discretization: number };
+  error: {
+    total: number;
+    residual: number;
+    sampling: number;
+    variation?: number;
+    discretization: number;
+    /** What people see, once it is measured: RMS at the surface, and what 95 % of places are off by less than. */
+    surface?: number;
+    p95?: number;
+  };
   energy: Record<string, number>;
   patches: number;
   nodes: number;
@@ -90,6 +99,8 @@ export interface Settings {
   texelSize: number;
   seed: number;
   doubleSided: boolean;
+  /** `texels` are the most there may be. */
+  adaptive: boolean;
   method: Method;
   /** For scenes without a sky of their own. */
   sky?: Sky | null;

@@ -143,6 +143,12 @@ export class SolvePanel {
         'Error',
         progress.unlit ? `no light arrives: ${progress.unlit}` : `${percent(error.total)} (target ${percent(target)})`,
       ],
+      [
+        'At the surface',
+        error.surface === undefined
+          ? '–'
+          : `${percent(error.surface)}, 95 % of places within ${percent(error.p95 ?? error.surface)}`,
+      ],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
       ['Within texels', percent(error.variation ?? 0)],

@@ -1,0 +1,87 @@
+// Texels that the engine chooses: as many as the error at the surface asks for, and no more than there may be.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/scenes/scenes.h"
+#include "tests/unit/engine/engine_driver.h"
+
+namespace radiosity::test {
+namespace {
+
+using engine::SolveSettings;
+using engine::SolveState;
+using test_scenes::lumpedCube;
+
+constexpr std::uint64_t kMost = 6000;
+
+class Adaptive : public EngineTest {
+ protected:
+  /// Solved, and what is left at the surface is known.
+  [[nodiscard]] bool isMeasured() {
+    const auto until = std::chrono::steady_clock::now() + kPatience;
+    while (std::chrono::steady_clock::now() < until) {
+      const auto now = status();
+      if (now.surface_error && !now.probes_surface && now.state != SolveState::kSolving) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return false;
+  }
+  void choose(double error, std::uint64_t most = kMost) {
+    ASSERT_TRUE(configure([&](SolveSettings& settings) {
+      settings.adaptive = true;
+      settings.texels = most;
+      settings.target_error = error;
+    }));
+  }
+};
+
+TEST_F(Adaptive, WithFixedTexelsTheErrorAtTheSurfaceIsToldOnceItIsMeasured) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(isMeasured());
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_GT(status().surface_error->total, 0.0);
+  EXPECT_GE(status().surface_error->p95, 0.0);
+}
+
+TEST_F(Adaptive, AnEditMakesItUnknownUntilItIsMeasuredAgain) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(isMeasured());
+  ASSERT_TRUE(configure([](SolveSettings& settings) { settings.target_error = kNever; }));
+  EXPECT_EQ(status().state, SolveState::kSolving);
+  EXPECT_FALSE(status().probes_surface);
+}
+
+TEST_F(Adaptive, TheTargetIsMetAtTheSurface) {
+  choose(kEasy);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  ASSERT_TRUE(isMeasured());
+  EXPECT_LE(status().surface_error->total, kEasy);
+  EXPECT_LE(status().patches, kMost);
+}
+
+TEST_F(Adaptive, WhatNoTexelsCanReachSaysHowManyAreUsed) {
+  choose(0.01, 300);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kLimited));
+  EXPECT_THAT(status().failure, testing::HasSubstr("texels: "));
+  EXPECT_GT(status().surface_error->total, 0.01);
+}
+
+TEST_F(Adaptive, AnEditWhileTexelsAreChosenIsNotLost) {
+  choose(kEasy);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  const auto edited = call<engine::PatchOutcome>(
+      [&](auto done) { engine().patch({.patch = emissionPatch(1, 2.0), .by = "test"}, done); });
+  ASSERT_TRUE(edited);
+  EXPECT_EQ(edited->revision, 2U);
+  ASSERT_TRUE(isMeasured());
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_EQ(status().revision, 2U);
+}
+
+}  // namespace
+}  // namespace radiosity::test
