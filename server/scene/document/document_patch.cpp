@@ -112,7 +112,9 @@ Result<Document> patched(const Document& document, const Json& patch, const Find
   if (!gltf) return tl::unexpected(gltf.error());
   parts = touchedParts(patch, touched);
   Document out = {document.name, std::move(*gltf), document.buffers, document.images};
-  if (auto ok = attachUploads(out, uploads, limits); !ok) return tl::unexpected(ok.error());
+  // What is not touched has its bytes, and is decoded; to look for more costs as much as the document is long.
+  if (parts.all)
+    if (auto ok = attachUploads(out, uploads, limits); !ok) return tl::unexpected(ok.error());
   materialiseDefaults(out.gltf, parts);  // of what was added
   return out;
 }

@@ -185,6 +185,20 @@ TEST(Draco, anEditBringsCompressedMeshesToo) {
   EXPECT_NEAR(areaOf(edited->scene.primitives.at(1)), 1.0, 1e-3);
 }
 
+// To look through all meshes took 53 ms for 100,000 of them, in an edit that costs a few else.
+TEST(Draco, anEditOfANodeLooksForNoneInMeshes) {
+  GltfBuilder room;
+  room.node({{"mesh", room.square()}});
+  auto document = room.document();
+  ASSERT_TRUE(document);
+  document->gltf["meshes"][0]["primitives"][0]["extensions"][kDraco] = {{"bufferView", 0},
+                                                                        {"attributes", {{"_NONE", 0}}}};
+  const Json patch = {{{"op", "replace"}, {"path", "/nodes/0/translation"}, {"value", {1, 2, 3}}}};
+  const auto edited = editDocument(*document, patch);
+  ASSERT_TRUE(edited) << edited.error().text();
+  EXPECT_EQ(edited->document.gltf["meshes"], document->gltf["meshes"]);
+}
+
 TEST(Draco, whatTheAccessorsDeclareMustBeWhatTheStreamHas) {
   const Grid grid(4);
   const auto stream = dracoStream(grid);
