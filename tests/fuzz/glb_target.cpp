@@ -5,6 +5,7 @@
 #include "tests/fuzz/target.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
+#include "tests/unit/scene/compressed_meshes.h"
 
 namespace radiosity::fuzz {
 namespace {
@@ -21,7 +22,10 @@ constexpr std::size_t kFewTriangles = 200;
 }  // namespace
 
 std::vector<Seed> seeds() {
+  const scene::test::Grid compressed(3);
   return {
+      scene::test::dracoDocument(compressed, scene::test::dracoStream(compressed)).glb(),
+      scene::test::MeshoptBuilder("EXT_meshopt_compression").mesh(compressed).glb(),
       test_scenes::encodeGlb(test_scenes::lumpedCube(0.5)), test_scenes::encodeGlb(test_scenes::cornell()),
       seedOf(
           R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})"),

@@ -1,12 +1,9 @@
 // A whole load: a small scene made by the rules that the bytes name, read, imported, charted and lit for a tenth of a
 // second. What it costs is bounded by what it has: a find is a load that takes seconds or a gigabyte.
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -17,6 +14,7 @@
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
+#include "tests/fuzz/cost.h"
 #include "tests/fuzz/target.h"
 #include "tests/unit/solver/quad_scene.h"
 
@@ -198,8 +196,6 @@ class SceneMaker {
   std::string bin_;
 };
 
-double processorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
 void light(const std::shared_ptr<const scene::PatchScene>& patches, const scene::PatchMaterials& materials) {
   test::RayTransport transport(16);
   if (!transport.setScene(patches)) return;
@@ -250,12 +246,8 @@ std::vector<Seed> seeds() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace radiosity::fuzz;  // NOLINT
-  rusage before{}, after{};
-  getrusage(RUSAGE_SELF, &before);
-  const auto begin = processorSeconds();
+  const Cost cost;
   load({data, size});
-  require(processorSeconds() - begin < kMostSeconds, "a small scene is loaded within seconds");
-  getrusage(RUSAGE_SELF, &after);
-  require(after.ru_maxrss - before.ru_maxrss < kMostKilobytes, "a small scene takes less than a gigabyte");
+  cost.requireAtMost(kMostSeconds, kMostKilobytes);
   return 0;
 }

@@ -120,6 +120,22 @@ inline GltfBuilder dracoDocument(const Grid& grid, const Bytes& stream) {
   return builder;
 }
 
+inline Bytes meshoptAttributes(const Bytes& elements, std::size_t count) {
+  const auto stride = elements.size() / count;
+  Bytes stream(meshopt_encodeVertexBufferBound(count, stride));
+  stream.resize(meshopt_encodeVertexBuffer(stream.data(), stream.size(), elements.data(), count, stride));
+  return stream;
+}
+
+inline Bytes meshoptIndices(const std::vector<std::uint32_t>& indices, std::size_t points, bool triangles) {
+  const auto* corners = indices.data();
+  Bytes stream(triangles ? meshopt_encodeIndexBufferBound(indices.size(), points)
+                         : meshopt_encodeIndexSequenceBound(indices.size(), points));
+  stream.resize(triangles ? meshopt_encodeIndexBuffer(stream.data(), stream.size(), corners, indices.size())
+                          : meshopt_encodeIndexSequence(stream.data(), stream.size(), corners, indices.size()));
+  return stream;
+}
+
 /// Documents whose views are compressed by meshoptimizer, with a fallback buffer that has no data.
 class MeshoptBuilder {
  public:
@@ -128,21 +144,15 @@ class MeshoptBuilder {
   /// Elements as the filter's encoder left them; returns their view.
   std::size_t attributes(const Bytes& elements, std::size_t count, const char* filter = "NONE") {
     const auto stride = elements.size() / count;
-    Bytes stream(meshopt_encodeVertexBufferBound(count, stride));
-    stream.resize(meshopt_encodeVertexBuffer(stream.data(), stream.size(), elements.data(), count, stride));
-    return view(stream, {{"mode", "ATTRIBUTES"}, {"filter", filter}, {"count", count}, {"byteStride", stride}});
+    return view(meshoptAttributes(elements, count),
+                {{"mode", "ATTRIBUTES"}, {"filter", filter}, {"count", count}, {"byteStride", stride}});
   }
 
   /// `width`: bytes of an index.
   std::size_t indices(const std::vector<std::uint32_t>& indices, std::size_t points, const std::string& mode,
                       std::size_t width) {
-    const bool triangles = mode == "TRIANGLES";
-    Bytes stream(triangles ? meshopt_encodeIndexBufferBound(indices.size(), points)
-                           : meshopt_encodeIndexSequenceBound(indices.size(), points));
-    const auto* corners = indices.data();
-    stream.resize(triangles ? meshopt_encodeIndexBuffer(stream.data(), stream.size(), corners, indices.size())
-                            : meshopt_encodeIndexSequence(stream.data(), stream.size(), corners, indices.size()));
-    return view(stream, {{"mode", mode}, {"count", indices.size()}, {"byteStride", width}});
+    return view(meshoptIndices(indices, points, mode == "TRIANGLES"),
+                {{"mode", mode}, {"count", indices.size()}, {"byteStride", width}});
   }
 
   /// Shows a grid.
