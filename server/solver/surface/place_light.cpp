@@ -31,9 +31,12 @@ float strongest(const glm::vec3& colour) { return std::max({colour.x, colour.y, 
 }  // namespace
 
 PlaceLight::PlaceLight(const SolvedScene& solved)
-    : patches_(solved.patches), sides_(makeSides(patches_)), rays_(solved.rays), normals_(solved.normals) {
-  if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, sides_);
-  auto lamps = findLightPolygons(patches_, sides_, solved.materials.emission);
+    : patches_(solved.patches),
+      sides_(std::make_shared<std::vector<Side>>(makeSides(patches_))),
+      rays_(solved.rays),
+      normals_(solved.normals) {
+  if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, *sides_);
+  auto lamps = findLightPolygons(patches_, *sides_, solved.materials.emission);
   std::erase_if(lamps, [](const LightPolygon& lamp) { return lamp.emission == glm::vec3(0.0F); });
   if (lamps.size() <= kEachLamp) {
     lamps_ = std::move(lamps);
@@ -46,7 +49,7 @@ PlaceLight::PlaceLight(const SolvedScene& solved)
   sources_ = punctual.makeSources(patches_, solved.sources);
   sky_ = {glm::dvec3(skyRadiosity(true, sources_)), glm::dvec3(skyRadiosity(false, sources_))};
   std::erase_if(sources_, [](const auto& source) { return source.kind == PunctualLights::Source::Kind::kSky; });
-  for (const auto& side : sides_) {
+  for (const auto& side : *sides_) {
     const auto emission = solved.materials.emission.side(side.number);
     const auto reflectance = solved.materials.reflectance.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {

@@ -53,7 +53,7 @@ class PlaceLight {
   /// seen in part; of more than kEachLamp of them 64 in all.
   [[nodiscard]] glm::dvec3 arriving(const Spot& spot, std::uint64_t key) const;
 
-  [[nodiscard]] const std::vector<Side>& sides() const { return sides_; }
+  [[nodiscard]] const std::vector<Side>& sides() const { return *sides_; }
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
 
  private:
@@ -71,7 +71,7 @@ class PlaceLight {
                             std::uint64_t key) const;
 
   const scene::PatchScene& patches_;
-  std::vector<Side> sides_;
+  std::shared_ptr<std::vector<Side>> sides_;  ///< rays made here refer to them, wherever this is moved to
   std::shared_ptr<const LeafRays> rays_;
   std::shared_ptr<const scene::ShadingNormals> normals_;
   std::vector<LightPolygon> lamps_;  ///< each by itself; empty: there are too many, or none

@@ -48,7 +48,7 @@ class SurfaceError {
     double area = 0.0;    ///< that the place stands for, unit box squared
   };
   [[nodiscard]] std::vector<Measured> measured() const;
-  /// When it is done; all zero where there is no light.
+  /// When it is done. Where there is no light all is zero, or one where lookups find some.
   [[nodiscard]] SurfaceErrorParts stated() const;
 
  private:

@@ -24,7 +24,7 @@ Document someDocument() {
 constexpr std::array kFew = {
     R"([{"op":"replace","path":"/nodes/@b/translation","value":[4,5,6]}])",
     R"([{"op":"replace","path":"/materials/@m/emissiveFactor","value":[1,1,0]}])",
-    R"([{"op":"add","path":"/materials/2","value":{}},{"op":"remove","path":"/materials/@m/alphaMode"}])",
+    R"([{"op":"add","path":"/materials/3","value":{}},{"op":"remove","path":"/materials/@m/alphaMode"}])",
     R"([{"op":"replace","path":"/materials/1","value":{"extensions":{"KHR_materials_unlit":{}}}}])",
     R"([{"op":"replace","path":"/extensions/KHR_lights_punctual/lights/0","value":{"type":"point"}}])",
     R"([{"op":"add","path":"/nodes/-","value":{"name":"c"}},{"op":"add","path":"/nodes/4/scale","value":[1,1,2]},

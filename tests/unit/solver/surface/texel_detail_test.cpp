@@ -83,7 +83,7 @@ TEST_F(TexelDetailTest, NoiseIsNoBend) {
     second[node] *= (leaf * 104729U % 11U) < 5U ? 1.1F : 0.9F;
   }
   const std::vector<SurfaceError::Measured> measured{{0, 1.0, 1.0}, {1, 1.0, 1.0}, {2, 1.0, 1.0}};
-  const auto chosen = chooseDetail(*scene_.patches, first, second, measured, {0.05, 1e6});
+  const auto chosen = chooseDetail(*scene_.patches, first, second, measured, {0.02, 1e6});
   EXPECT_LT(chosen.of_surface[0], chosen.of_surface[2] / 2.0F);
 }
 

@@ -1,0 +1,149 @@
+// What is measured at the surface, against Lambert's formula and against lookups that are wrong by a known amount.
+#include "server/solver/surface/surface_error.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/solver/math/polygon_form_factor.h"
+#include "tests/unit/solver/quad_scene.h"
+
+namespace radiosity::solver {
+namespace {
+
+constexpr float kEmission = 5.0F;
+
+/// A black floor, a lamp above its middle and, where it is asked for, a plate that hides the lamp from a part of it.
+class SurfaceErrorTest : public testing::Test {
+ protected:
+  explicit SurfaceErrorTest(bool has_plate = false) {
+    test::Quad floor{{-0.5F, -0.4F, 0.5F}, {1.0F, 0.0F, 0.0F}, {0.0F, 0.0F, -1.0F}};
+    floor.width = floor.height = 16;
+    test::Quad lamp{{-0.1F, 0.4F, -0.1F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.0F, 0.2F}};
+    lamp.width = lamp.height = 1;
+    lamp.emission = glm::vec3(kEmission);
+    std::vector<test::Quad> quads{floor, lamp};
+    if (has_plate) {
+      test::Quad plate{{-0.1F, 0.0F, -0.1F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.0F, 0.2F}};
+      plate.width = plate.height = 1;
+      quads.push_back(plate);
+    }
+    scene_ = test::makeQuadScene(quads);
+    irradiance_.assign(scene_.patches->nodeCount(), glm::vec3(0.0F));
+  }
+
+  [[nodiscard]] PlaceLight light() const {
+    return PlaceLight({*scene_.patches, nullptr, nullptr, scene_.materials, sources_, irradiance_});
+  }
+
+  /// Of the floor, as if nothing hid the lamp.
+  [[nodiscard]] static double litAt(const glm::dvec3& at) {
+    const std::array<glm::vec3, 4> corners{
+        glm::vec3(-0.1F, 0.4F, -0.1F), {0.1F, 0.4F, -0.1F}, {0.1F, 0.4F, 0.1F}, {-0.1F, 0.4F, 0.1F}};
+    return static_cast<double>(kEmission) * polygonFormFactor(at, {0, 1, 0}, corners);
+  }
+
+  /// Stated for lookups that find `factor` times the light that there is, on the floor; elsewhere none arrives.
+  [[nodiscard]] SurfaceErrorParts statedFor(float factor, double slice = 1e9) const {
+    SurfaceError error(light(), 1, 512);
+    std::vector<glm::vec3> found;
+    for (const auto& at : error.lookups()) {
+      const glm::dvec3 place(-0.5 + static_cast<double>(at.texel.x) / 16.0, -0.4,
+                             0.5 - static_cast<double>(at.texel.y) / 16.0);
+      found.emplace_back(at.surface == 0 && at.side == 0 ? factor * static_cast<float>(litAt(place)) : 0.0F);
+    }
+    error.take(std::move(found));
+    while (!error.advance(slice)) continue;
+    return error.stated();
+  }
+
+  test::QuadScene scene_;
+  std::vector<glm::vec3> irradiance_;
+  LightSources sources_;
+};
+
+class SurfaceErrorUnderAPlate : public SurfaceErrorTest {
+ protected:
+  SurfaceErrorUnderAPlate() : SurfaceErrorTest(true) {}
+};
+
+TEST_F(SurfaceErrorTest, APlaceThatSeesAllOfALampHasTheLightOfLambertsFormula) {
+  const auto places = light();
+  for (const auto value : {0U, 37U, 136U, 255U}) {
+    const auto spot = places.spotOn(value, {0.3F, 0.6F});
+    const auto arrives = places.arriving(spot, 7);
+    EXPECT_NEAR(arrives.x, litAt(spot.place.position), 1e-5) << value;
+    EXPECT_EQ(arrives.x, arrives.z);
+  }
+}
+
+// The light is known exactly here, so that what is stated is the factor, but for the rounding of positions.
+TEST_F(SurfaceErrorTest, WhatLookupsAreOffByIsStated) {
+  EXPECT_NEAR(statedFor(1.1F).total, 0.1, 1e-3);
+  EXPECT_NEAR(statedFor(1.1F).p95, 0.1, 1e-3);
+  EXPECT_NEAR(statedFor(0.7F).total, 0.3, 1e-3);
+  EXPECT_LT(statedFor(1.0F).total, 1e-3);
+  EXPECT_LT(statedFor(1.0F).p95, 1e-3);
+}
+
+TEST_F(SurfaceErrorTest, WhereTheCutsLieChangesNoBit) {
+  const auto whole = statedFor(1.1F), sliced = statedFor(1.1F, 0.0);
+  EXPECT_EQ(whole.total, sliced.total);
+  EXPECT_EQ(whole.p95, sliced.p95);
+  EXPECT_EQ(whole.deviation, sliced.deviation);
+}
+
+// Lookups that know nothing of the plate are wrong in its shadow alone, and there by all of the light.
+TEST_F(SurfaceErrorUnderAPlate, AShadowThatLookupsMissIsStated) {
+  const auto stated = statedFor(1.0F);
+  EXPECT_GT(stated.total, 0.3);
+  EXPECT_GT(stated.p95, 0.5);
+}
+
+TEST_F(SurfaceErrorUnderAPlate, UnderItThereIsNoLight) {
+  const auto places = light();
+  EXPECT_EQ(places.arriving(places.spotOn(8 * 16 + 8, {0.5F, 0.5F}), 3).x, 0.0);
+}
+
+// A lamp that is half hidden is seen by points of it: two estimates differ, and their mean is near the part that is
+// open, of 32 points each to some 3 %.
+TEST_F(SurfaceErrorUnderAPlate, InPenumbraThePartThatIsOpenCounts) {
+  const auto places = light();
+  const auto spot = places.spotOn(8 * 16 + 4, {0.5F, 0.5F});
+  const auto far = spot.place.position;  // from there the plate hides what lies beyond a line across the lamp
+  double mean = 0.0;
+  for (std::uint64_t key = 0; key < 64; ++key) mean += places.arriving(spot, key).x / 64.0;
+  // By integration over the lamp.
+  constexpr int kGrid = 200;
+  double open = 0.0, all = 0.0;
+  for (int i = 0; i < kGrid; ++i) {
+    for (int k = 0; k < kGrid; ++k) {
+      const glm::dvec3 point(-0.1 + 0.2 * (i + 0.5) / kGrid, 0.4, -0.1 + 0.2 * (k + 0.5) / kGrid);
+      const auto way = point - far;
+      const double square = glm::dot(way, way), weight = way.y * way.y / (square * square);
+      const auto at = far + way * ((0.0 - far.y) / way.y);
+      all += weight;
+      if (std::abs(at.x) > 0.1 || std::abs(at.z) > 0.1) open += weight;
+    }
+  }
+  EXPECT_GT(open, 0.2 * all);
+  EXPECT_LT(open, 0.8 * all);
+  EXPECT_NEAR(mean, litAt(far) * open / all, 0.01 * litAt(far));
+}
+
+// A leak into the dark is no small thing beside nothing.
+TEST_F(SurfaceErrorTest, LightWhereThereIsNoneIsAllWrong) {
+  scene_.materials.emission.fill(glm::vec3(0.0F));
+  EXPECT_EQ(statedFor(1.0F).total, 1.0);
+  EXPECT_EQ(statedFor(1.0F).p95, 1.0);
+}
+
+TEST_F(SurfaceErrorTest, WithoutLightNothingIsStated) {
+  scene_.materials.emission.fill(glm::vec3(0.0F));
+  const auto stated = statedFor(0.0F);
+  EXPECT_EQ(stated.total, 0.0);
+  EXPECT_EQ(stated.p95, 0.0);
+}
+
+}  // namespace
+}  // namespace radiosity::solver
