@@ -243,7 +243,8 @@ class Solve {
   }
 
   ExitCode finish(client::Connection& connection, protocol::StatusReply status) {
-    const bool reached = status.progress.error.total <= options_.error;
+    const bool reached =
+        status.progress.error.total <= options_.error && (!options_.adaptive || status.progress.state == "converged");
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings",
                        percentText(status.progress.error.total)));

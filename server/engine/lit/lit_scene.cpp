@@ -18,8 +18,9 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
-/// Where the program chooses texels it looks at so many first, to so much of an error; and of the error asked for,
-/// whose square is that of both, so much may be the solver's and so much that of texels.
+/// Where the program chooses texels it looks at so many first, half of what there may be at most, to so much of an
+/// error; and of the error asked for, whose square is that of both, so much may be the solver's and so much that of
+/// texels.
 constexpr std::uint64_t kPilotTexels = 16'000;
 constexpr double kPilotError = 0.03, kSolversPart = 0.5, kTexelsPart = 0.82;
 /// One layout has at most so many times as many texels as the one before, which tells too little of more.
@@ -91,7 +92,8 @@ Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, 
 
 scene::ChartOptions LitScene::chartOptions() const {
   scene::ChartOptions charts;
-  charts.texel_budget = settings_.choosesTexels() ? std::min(settings_.texels, kPilotTexels) : settings_.texels;
+  charts.texel_budget =
+      settings_.choosesTexels() ? std::min((settings_.texels + 1) / 2, kPilotTexels) : settings_.texels;
   charts.texel_size_m = settings_.texel_size_m;
   charts.sky = skyOf(*scene_);
   return charts;
@@ -459,10 +461,12 @@ std::vector<glm::vec3> LitScene::ownLight() const {
 }
 
 void LitScene::probeSurface(double seconds) {
-  const auto irradiance = ownLight();
-  surface_probe_.advance(
-      {*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
-      [this] { return pages(); }, seconds);
+  if (!surface_probe_.hasBegun()) {
+    const auto irradiance = ownLight();
+    surface_probe_.begin({*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
+                         scene::assemblePages(*patches_, irradiance));
+  }
+  surface_probe_.advance(seconds);
 }
 
 std::vector<scene::LightmapPage> LitScene::pages() const { return scene::assemblePages(*patches_, ownLight()); }

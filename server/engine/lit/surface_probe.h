@@ -20,24 +20,17 @@ class SurfaceProbe {
     stated_.reset();
     measured_.clear();
   }
-  /// Goes on for about `seconds`, from the beginning where there is none yet. `solved` is to stay as it is until
-  /// forget(); `make_pages` makes what lookups are made in.
-  template <typename MakePages>
-  void advance(const solver::SolvedScene& solved, std::uint64_t seed, const MakePages& make_pages, double seconds) {
-    if (!measuring_) begin(solved, seed, make_pages());
-    if (!measuring_->advance(seconds)) return;
-    stated_ = measuring_->stated();
-    measured_ = measuring_->measured();
-    measuring_.reset();
-  }
+  [[nodiscard]] bool hasBegun() const { return measuring_ != nullptr; }
+  /// `solved` is to stay as it is until forget(); lookups are made in `pages`.
+  void begin(const solver::SolvedScene& solved, std::uint64_t seed, std::span<const scene::LightmapPage> pages);
+  /// Once it has begun: goes on for about `seconds`.
+  void advance(double seconds);
   /// Nothing: it is not measured yet.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& stated() const { return stated_; }
   /// Place by place, what that was found by.
   [[nodiscard]] std::span<const solver::SurfaceError::Measured> measured() const { return measured_; }
 
  private:
-  void begin(const solver::SolvedScene& solved, std::uint64_t seed, const std::vector<scene::LightmapPage>& pages);
-
   std::unique_ptr<solver::SurfaceError> measuring_;
   std::optional<solver::SurfaceErrorParts> stated_;
   std::vector<solver::SurfaceError::Measured> measured_;

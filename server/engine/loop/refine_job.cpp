@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <cmath>
 #include <utility>
 
 #include "server/engine/lit/memory.h"
@@ -18,9 +19,21 @@ RefineJob::~RefineJob() {
   thread_.join();
 }
 
+/// Rows and columns are whole: where that makes more texels than there may be, coarser ones are tried.
+RefineJob::Made RefineJob::layOut() {
+  constexpr int kMostTries = 4;
+  constexpr double kSpare = 0.97;
+  for (int tries = 1;; ++tries) {
+    auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, order_.detail);
+    if (!lit || (*lit)->patchCount() <= order_.settings.texels || tries == kMostTries) return lit;
+    const auto part = static_cast<double>(order_.settings.texels) / static_cast<double>((*lit)->patchCount());
+    for (auto& detail : order_.detail) detail *= static_cast<float>(kSpare * std::sqrt(part));
+  }
+}
+
 void RefineJob::run() {
   auto made = unlessCancelled(task_, [&]() -> Made {
-    auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, std::move(order_.detail));
+    auto lit = layOut();
     if (!lit) return lit;
     if (order_.draft_error > 0.0) (*lit)->setDraft(order_.draft_error);
     (void)(*lit)->startSolve();  // all that the solve thread need not do

@@ -40,6 +40,7 @@ class RefineJob {
 
  private:
   void run();
+  [[nodiscard]] Made layOut();
 
   Order order_;
   solver::Transport& transport_;

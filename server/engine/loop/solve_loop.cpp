@@ -218,16 +218,13 @@ void SolveLoop::solveSlice() {
     return tellProgress(false);
   }
   unpublished_ = true;
-  const bool has_ended = *outcome == solver::StepOutcome::kConverged || *outcome == solver::StepOutcome::kExhausted;
-  if (has_ended && mayRefine() && !lit_->solver().isBehind()) {
-    const bool converged = *outcome == solver::StepOutcome::kConverged;
-    beginRefinement(converged ? SolveState::kConverged : SolveState::kLimited);
-  } else if (*outcome == solver::StepOutcome::kConverged) {
-    endSolve(SolveState::kConverged);
+  const bool chooses = settings_.choosesTexels();
+  if (*outcome == solver::StepOutcome::kConverged) {
+    chooses ? beginRefinement(SolveState::kConverged, {}) : endSolve(SolveState::kConverged);
   } else if (*outcome == solver::StepOutcome::kExhausted) {
-    failure_ = limitText(lit_->solver().limit(), settings_.link_memory_bytes);
-    log::warn("the solve ends above its target error: {}", failure_);
-    endSolve(SolveState::kLimited);
+    auto why = limitText(lit_->solver().limit(), settings_.link_memory_bytes);
+    chooses ? beginRefinement(SolveState::kLimited, std::move(why))
+            : endRefinement(SolveState::kLimited, std::move(why));
   } else if (out_of_time) {
     endSolve(SolveState::kTimeLimit);
   } else {

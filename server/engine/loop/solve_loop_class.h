@@ -131,13 +131,16 @@ class SolveLoop final : public Engine {
   /// their place. `otherwise`: how the solve ends where none do.
   struct Refinement {
     SolveState otherwise;
+    std::string why;                 ///< where that is kLimited
     std::unique_ptr<RefineJob> job;  ///< null: it is still being measured
     Clock::time_point ordered{};
   };
-  [[nodiscard]] bool mayRefine() const;
-  void beginRefinement(SolveState otherwise);
+  void beginRefinement(SolveState otherwise, std::string why);
   void refineSlice();
-  void orderRefined();
+  void judgeTexels();
+  void endRefinement(SolveState state, std::string why);
+  void orderRefined(solver::TexelDetail wanted);
+  void keepTexels(const std::string& why);
   void takeRefined();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.

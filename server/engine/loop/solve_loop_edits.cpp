@@ -270,6 +270,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   const SolveSettings before = settings_;
   const bool reshaped = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m ||
                         before.double_sided != settings.double_sided ||
+                        before.choosesTexels() != settings.choosesTexels() ||
                         (lit_ && before.sky != settings.sky && lit_->outgrows(settings));
   const bool anew = before.seed != settings.seed || before.method != settings.method ||
                     before.link_memory_bytes != settings.link_memory_bytes;
@@ -307,6 +308,8 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool reshaped, bool an
     (void)fitsMemory([&] { lit_->restart(settings_); });
     return beginSolve();
   }
+  refinement_.reset();  // it was for the settings before
+  refined_times_ = 0;
   lit_->retarget(settings_);
   bool other_light = before.sky != settings_.sky;
   if (other_light && !takeInLight([&] { return other_light = lit_->setSky(settings_); })) other_light = true;
@@ -321,8 +324,11 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool reshaped, bool an
 
 void SolveLoop::reconsiderStop() {
   if (state_ != SolveState::kConverged && state_ != SolveState::kTimeLimit && state_ != SolveState::kLimited) return;
-  const bool reached = lit_->solver().error().total <= settings_.target_error;
-  if (state_ == SolveState::kLimited && !reached) return;
+  // Where the program chooses texels, what is not measured counts as not reached: it will be.
+  const auto& surface = lit_->surfaceError();
+  const bool reached = settings_.choosesTexels() ? surface && surface->total <= settings_.target_error
+                                                 : lit_->solver().error().total <= settings_.target_error;
+  if (state_ == SolveState::kLimited && !reached && !settings_.choosesTexels()) return;
   failure_.clear();
   const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
   const SolveState now = reached ? SolveState::kConverged : out_of_time ? SolveState::kTimeLimit : SolveState::kSolving;

@@ -24,13 +24,8 @@ constexpr double kWorthwhile = 1.05;
 
 }  // namespace
 
-bool SolveLoop::mayRefine() const {
-  const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
-  return settings_.choosesTexels() && lit_ && refined_times_ < kMostRounds && !out_of_time;
-}
-
-void SolveLoop::beginRefinement(SolveState otherwise) {
-  refinement_.emplace(Refinement{otherwise, nullptr});
+void SolveLoop::beginRefinement(SolveState otherwise, std::string why) {
+  refinement_.emplace(Refinement{otherwise, std::move(why), nullptr});
   publishLightmaps(false);
   tellProgress(true);
 }
@@ -41,54 +36,63 @@ void SolveLoop::refineSlice() {
     takeRefined();
   } else {
     lit_->probeSurface(kProbeSeconds);
-    if (lit_->surfaceError()) orderRefined();
+    if (lit_->surfaceError()) judgeTexels();
   }
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 /// Ends the solve where that has what was asked for, or can have no more of it.
-void SolveLoop::orderRefined() {
-  const auto otherwise = refinement_->otherwise;
-  const bool is_draft = lit_->isDraft();
-  if (lit_->surfaceError()->total <= settings_.target_error && !is_draft) {
-    refinement_.reset();
-    return endSolve(SolveState::kConverged);
-  }
+void SolveLoop::judgeTexels() {
+  const double left = lit_->surfaceError()->total;
+  if (left <= settings_.target_error) return endRefinement(SolveState::kConverged, {});
+  if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
-  if (!is_draft && wanted.texels < kWorthwhile * texels) {
-    refinement_.reset();
-    failure_ = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
-                           settings_.texels, 100.0 * lit_->surfaceError()->total);
-    return endSolve(otherwise == SolveState::kConverged ? SolveState::kLimited : otherwise);
-  }
+  const bool is_worthwhile = lit_->isDraft() || wanted.texels >= kWorthwhile * texels;
+  if (refined_times_ < kMostRounds && is_worthwhile) return orderRefined(std::move(wanted));
+  if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
+  endRefinement(SolveState::kLimited, fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface",
+                                                  texels, settings_.texels, 100.0 * left));
+}
+
+void SolveLoop::endRefinement(SolveState state, std::string why) {
+  refinement_.reset();
+  failure_ = std::move(why);
+  if (!failure_.empty()) log::warn("the solve ends above its target error: {}", failure_);
+  endSolve(state);
+}
+
+/// The last layout there can be is no draft.
+void SolveLoop::orderRefined(solver::TexelDetail wanted) {
+  const bool is_last = wanted.error <= settings_.target_error || refined_times_ + 1 == kMostRounds ||
+                       wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
   try {
-    const bool suffices =
-        wanted.error <= settings_.target_error || wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
     RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.of_surface),
-                           suffices ? 0.0 : wanted.error};
+                           is_last ? 0.0 : wanted.error};
     refinement_->job = std::make_unique<RefineJob>(std::move(order), *transport_, [this] { queue_.wake(); });
     refinement_->ordered = Clock::now();
   } catch (const std::system_error& error) {
-    log::warn("texels stay as they are: no thread to lay them out with: {}", error.what());
-    refinement_.reset();
-    endSolve(otherwise);
+    keepTexels(error.what());
   }
+}
+
+/// None take their place: light is solved for as well as was asked for on those that there are.
+void SolveLoop::keepTexels(const std::string& why) {
+  log::warn("texels stay as they are: {}", why);
+  refinement_.reset();
+  refined_times_ = kMostRounds;
+  lit_->setDraft(0.0);
+  lit_->retarget(settings_);
 }
 
 void SolveLoop::takeRefined() {
   auto made = refinement_->job->take();
   if (!made) return;
-  const auto otherwise = refinement_->otherwise;
   seconds_ += std::chrono::duration<double>(Clock::now() - refinement_->ordered).count();
   refinement_.reset();
   ++refined_times_;
-  if (const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit()); !lit) {
-    log::warn("texels stay as they are: {}", lit.error().text());
-    refined_times_ = kMostRounds;
-    return endSolve(otherwise);
-  }
-  former_.reset();  // its texels are others
+  if (const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit()); !lit)
+    return lit_ && state_ == SolveState::kSolving ? keepTexels(lit.error().text()) : void();
   unpublished_ = true;
   publishLightmaps(false);
   updateStatus(true);

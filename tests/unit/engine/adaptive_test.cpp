@@ -69,6 +69,7 @@ TEST_F(Adaptive, WhatNoTexelsCanReachSaysHowManyAreUsed) {
   ASSERT_TRUE(reaches(SolveState::kLimited));
   EXPECT_THAT(status().failure, testing::HasSubstr("texels: "));
   EXPECT_GT(status().surface_error->total, 0.01);
+  EXPECT_LE(status().patches, 300U);
 }
 
 TEST_F(Adaptive, AnEditWhileTexelsAreChosenIsNotLost) {
@@ -81,6 +82,42 @@ TEST_F(Adaptive, AnEditWhileTexelsAreChosenIsNotLost) {
   ASSERT_TRUE(isMeasured());
   EXPECT_EQ(status().state, SolveState::kConverged);
   EXPECT_EQ(status().revision, 2U);
+}
+
+// A scene that is there already gets the texels that are wanted from then on, and only as long as they are.
+TEST_F(Adaptive, ItCanBeAskedForAndNoMore) {
+  solve(lumpedCube(0.5));
+  const auto fixed = status().patches;
+  choose(kEasy);
+  ASSERT_TRUE(eventually([&] { return status().state == SolveState::kConverged && status().surface_error; }));
+  EXPECT_NE(status().patches, fixed);
+  EXPECT_LE(status().surface_error->total, kEasy);
+  ASSERT_TRUE(configure([](SolveSettings& settings) {
+    settings.adaptive = false;
+    settings.texels = 150;
+  }));
+  ASSERT_TRUE(eventually([&] { return status().state == SolveState::kConverged; }));
+  EXPECT_EQ(status().patches, fixed);
+}
+
+// It ends only once the last layout is measured, and says so where that is not good enough.
+TEST_F(Adaptive, ATighterTargetIsMetAtTheSurfaceToo) {
+  choose(0.1);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  choose(0.03);
+  ASSERT_TRUE(eventually([&] { return status().state != SolveState::kSolving && !status().probes_surface; }));
+  ASSERT_TRUE(status().surface_error);
+  EXPECT_EQ(status().state == SolveState::kConverged, status().surface_error->total <= 0.03);
+}
+
+TEST_F(Adaptive, AnotherTargetWhileTexelsAreChosenIsTheOneThatHolds) {
+  choose(0.03);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  choose(kEasy);
+  ASSERT_TRUE(eventually([&] { return status().state != SolveState::kSolving && status().surface_error; }));
+  EXPECT_EQ(status().settings.target_error, kEasy);
+  EXPECT_EQ(status().state, SolveState::kConverged);
 }
 
 }  // namespace
