@@ -92,6 +92,7 @@ json toJson(const Progress& p) {
               {"polygons", p.polygons}};
   if (p.error.surface) out["error"]["surface"] = *p.error.surface;
   if (p.error.p95) out["error"]["p95"] = *p.error.p95;
+  if (p.error.measuring) out["error"]["measuring"] = true;
   if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
   if (!p.failure.empty()) out["failure"] = p.failure;
   if (!p.unlit.empty()) out["unlit"] = p.unlit;
@@ -116,6 +117,7 @@ void read(Reader& r, Progress& p) {
     e.number("discretization", p.error.discretization, Need::kRequired, {});
     e.optionalNumber("surface", p.error.surface, {});
     e.optionalNumber("p95", p.error.p95, {});
+    e.boolean("measuring", p.error.measuring, Need::kOptional);
   });
   r.object("energy", Need::kOptional, [&](Reader& e) {
     e.number("emitted", p.energy.emitted, Need::kRequired, kAny);

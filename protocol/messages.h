@@ -50,6 +50,7 @@ struct ErrorParts {
   double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
   /// Measured where people look, and what 95 % of places are off by less than; nothing: not measured, yet.
   std::optional<double> surface = std::nullopt, p95 = std::nullopt;
+  bool measuring = false;  ///< they are on their way
 };
 
 struct EnergyParts {

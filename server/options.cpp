@@ -136,6 +136,7 @@ std::set<std::string> namedSettings(const CLI::App& app) {
   note("--time-limit", "timeLimit");
   note("--texels", "texels");
   note("--texel-size", "texels");
+  note("--adaptive", "adaptive");
   note("--seed", "seed");
   note("--sky", "sky");
   note("--double-sided", "doubleSided");

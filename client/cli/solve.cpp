@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <thread>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -231,11 +232,14 @@ class Solve {
   /// What people see of the error is measured while the result is being fetched. Of a solve that is not the one that
   /// was waited for any more nothing is told.
   static void addSurfaceError(client::Connection& connection, protocol::StatusReply& status) {
-    constexpr std::chrono::milliseconds kPatience = 60s;
-    (void)connection.call(protocol::SolveWaitCall{.revision = status.progress.revision,
-                                                  .timeout_ms = static_cast<std::uint64_t>(kPatience.count())},
-                          kPatience + 10s);
-    const auto now = connection.call(protocol::StatusCall{});
+    constexpr auto kPatience = 60s;
+    constexpr auto kBetween = 20ms;
+    const auto until = std::chrono::steady_clock::now() + kPatience;
+    auto now = connection.call(protocol::StatusCall{});
+    while (now && now->progress.error.measuring && std::chrono::steady_clock::now() < until) {
+      std::this_thread::sleep_for(kBetween);
+      now = connection.call(protocol::StatusCall{});
+    }
     if (!now || now->progress.revision != status.progress.revision || now->progress.shots != status.progress.shots)
       return;
     status.progress.error.surface = now->progress.error.surface;

@@ -55,6 +55,7 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.seconds = finite(s.seconds, 0.0);
   if (s.seconds_left && std::isfinite(*s.seconds_left)) p.seconds_left = std::max(0.0, *s.seconds_left);
   p.error = toErrorParts(s.error);
+  p.error.measuring = s.probes_surface;
   if (s.surface_error) {
     p.error.surface = finite(s.surface_error->total, 1e9);
     p.error.p95 = finite(s.surface_error->p95, 1e9);

@@ -53,7 +53,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   request.attributes = {{0, 5126, 3, "position"}, {1, 5126, 2, "uv"}, {2, 5121, 1, "id"}};
   request.points = fuzz::wordAt(bytes, 0);
   if (const auto faces = fuzz::wordAt(bytes, 2); faces != 0) request.faces = faces;
-  request.room = fuzz::kRoom;
+  request.room = request.attribute_room = fuzz::kRoom;
   request.where = "fuzz";
   const fuzz::Cost cost;
   const auto mesh = scene::decodeDraco(bytes.subspan(fuzz::kDeclared), request);

@@ -18,15 +18,6 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
-/// Where the program chooses texels it looks at so many first, half of what there may be at most, to so much of an
-/// error; and of the error asked for, whose square is that of both, so much may be the solver's and so much that of
-/// texels.
-constexpr std::uint64_t kPilotTexels = 16'000;
-constexpr double kPilotError = 0.03, kSolversPart = 0.5, kTexelsPart = 0.82;
-/// One layout has at most so many times as many texels as the one before, which tells too little of more.
-constexpr double kMostGrowth = 8.0;
-/// Texels are at most so many times as fine as those, or as coarse.
-constexpr float kMostDetail = 64.0F, kLeastDetail = 0.5F;
 
 std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
   std::uint64_t count = 0;
@@ -45,11 +36,11 @@ std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const SolveSettings& settings,
                                                  solver::Transport& transport, const scene::ImportLimits& limits,
-                                                 std::vector<float> detail) {
+                                                 scene::TexelLayout layout) {
   auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   scene::EditedDocument edited{std::move(document), std::move(*imported)};
-  return build(std::move(edited), settings, transport, nullptr, std::move(detail));
+  return build(std::move(edited), settings, transport, nullptr, std::move(layout));
 }
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, const SolveSettings& settings,
@@ -59,14 +50,20 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
 
 Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, const SolveSettings& settings,
                                                   solver::Transport& transport, const LitScene* former,
-                                                  std::vector<float> detail) {
+                                                  scene::TexelLayout layout) {
   configureScene(edited.scene, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(edited), settings, transport));
   std::optional<scene::FormerScene> before;
   if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
   lit->reproducible_ = former == nullptr;
   auto options = lit->chartOptions();
-  options.detail = std::move(detail);
+  options.layout = layout;
+  if (former != nullptr) {
+    lit->layout_ = former->layout_;
+    lit->draft_error_ = former->draft_error_;
+  } else {
+    lit->setLayout(std::move(layout));
+  }
   auto built = scene::buildWithRecord(*lit->scene_, options, before ? &*before : nullptr,
                                       former != nullptr ? former->burial_.get() : nullptr);
   if (!built) return tl::unexpected<Error>(built.error());
@@ -77,13 +74,14 @@ Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, 
 
 Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, const SolveSettings& settings,
                                                       solver::Transport& transport, const scene::SideBits& sides,
-                                                      std::vector<float> detail, const scene::ImportLimits& limits) {
+                                                      scene::TexelLayout layout, const scene::ImportLimits& limits) {
   auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   configureScene(*imported, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene({std::move(document), std::move(*imported)}, settings, transport));
   auto options = lit->chartOptions();
-  options.detail = std::move(detail);
+  options.layout = layout;
+  lit->setLayout(std::move(layout));
   auto built = scene::buildAgain(*lit->scene_, options, sides);
   if (!built) return tl::unexpected<Error>(built.error());
   lit->take(std::move(*built));
@@ -92,43 +90,26 @@ Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, 
 
 scene::ChartOptions LitScene::chartOptions() const {
   scene::ChartOptions charts;
-  charts.texel_budget =
-      settings_.choosesTexels() ? std::min((settings_.texels + 1) / 2, kPilotTexels) : settings_.texels;
+  charts.texel_budget = texelBudget(settings_);
   charts.texel_size_m = settings_.texel_size_m;
   charts.sky = skyOf(*scene_);
   return charts;
 }
 
-/// What is stated at the surface is of both, the solver's and that of texels. Where these are still to be chosen the
-/// light need not be known as well.
-double LitScene::solverTarget() const {
-  if (!settings_.choosesTexels()) return settings_.target_error;
-  return kSolversPart * std::max(settings_.target_error, draft_error_);
+/// Texels alike are a draft where others are to be chosen.
+void LitScene::setLayout(scene::TexelLayout layout) {
+  layout_ = std::move(layout);
+  draft_error_ = settings_.choosesTexels() && layout_.empty() ? kPilotDraft : 0.0;
 }
 
-std::vector<float> LitScene::detail() const {
-  std::vector<float> detail;
-  if (!has_detail_) return detail;
-  for (const auto& surface : patches_->surfaces) detail.push_back(surface.detail);
-  return detail;
-}
-
-solver::TexelDetail LitScene::wantedTexels() const {
-  const double most = std::min(static_cast<double>(settings_.texels), kMostGrowth * static_cast<double>(patch_count_));
-  const solver::DetailGoal goal{kTexelsPart * settings_.target_error, most};
-  auto wanted = solver::chooseDetail(*patches_, solver_->halfIrradiance(0), solver_->halfIrradiance(1),
-                                     surface_probe_.measured(), goal);
-  for (std::size_t s = 0; s < wanted.of_surface.size(); ++s)
-    wanted.of_surface[s] = std::clamp(wanted.of_surface[s] * patches_->surfaces[s].detail, kLeastDetail, kMostDetail);
-  return wanted;
+WantedTexels LitScene::wantedTexels() const {
+  return engine::wantedTexels(*patches_, *solver_, surface_probe_.measured(), settings_, patch_count_);
 }
 
 void LitScene::take(scene::BuiltScene built) {
   patches_ = std::make_shared<const scene::PatchScene>(std::move(built.patches));
   burial_ = std::move(built.burial);
   normals_ = std::move(built.normals);
-  has_detail_ = std::ranges::any_of(patches_->surfaces, [](const auto& surface) { return surface.detail != 1.0F; });
-  if (settings_.choosesTexels() && !has_detail_) draft_error_ = kPilotError / kSolversPart;
   patch_count_ = leavesWithArea(*patches_);
   materials_ = scene::shadePatches(*scene_, *patches_);
   light_report_.findDark(litParts());
@@ -256,7 +237,7 @@ double LitScene::emittedPower() const {
 
 void LitScene::makeSolver(const solver::FormerSolver* former) {
   solver::SolverSettings settings;
-  settings.target_error = solverTarget();
+  settings.target_error = solverTarget(settings_, draft_error_);
   settings.seed = settings_.seed;
   settings.method = settings_.method;
   settings.link_memory = settings_.link_memory_bytes;

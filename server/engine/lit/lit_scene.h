@@ -14,6 +14,7 @@
 #include "server/engine/lit/light_report.h"
 #include "server/engine/lit/scene_change.h"
 #include "server/engine/lit/surface_probe.h"
+#include "server/engine/lit/texel_choice.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
 #include "server/scene/lightmap/lightmap.h"
@@ -22,7 +23,6 @@
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
-#include "server/solver/surface/texel_detail.h"
 
 namespace radiosity::scene {
 class BurialRecord;
@@ -36,12 +36,12 @@ void configureScene(scene::Scene& scene, const SolveSettings& settings);
 
 class LitScene {
  public:
-  /// Imports and charts. The transport stays as it is until upload(). `detail`: of the texels of its surfaces, as
+  /// Imports and charts. The transport stays as it is until upload(). `layout`: of its texels, as
   /// wantedTexels() tells; empty: all are alike.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
                                                               solver::Transport& transport,
                                                               const scene::ImportLimits& limits = {},
-                                                              std::vector<float> detail = {});
+                                                              scene::TexelLayout layout = {});
   /// The same for a document that has been imported already. With a former scene that this one is an edit of, charts
   /// that the edit left alone stay as they are.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,
@@ -53,15 +53,15 @@ class LitScene {
   /// when it was laid out. kBadInput: the scene cannot have had them.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> makeAgain(
       scene::Document document, const SolveSettings& settings, solver::Transport& transport,
-      const scene::SideBits& sides, std::vector<float> detail, const scene::ImportLimits& limits = {});
+      const scene::SideBits& sides, scene::TexelLayout layout, const scene::ImportLimits& limits = {});
 
   /// Whether makeAgain() gives the same charts, so that a saved solve fits them. One whose charts stayed where a former
   /// scene had them is its own.
   [[nodiscard]] bool isReproducible() const { return reproducible_; }
   /// For makeAgain(). A pass over the surfaces.
   [[nodiscard]] scene::SideBits sides() const;
-  /// Likewise: empty where all texels are alike.
-  [[nodiscard]] std::vector<float> detail() const;
+  /// Likewise: as it was made with.
+  [[nodiscard]] const scene::TexelLayout& layout() const { return layout_; }
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
@@ -140,7 +140,7 @@ class LitScene {
   /// Another target or time limit: the solve goes on from where it is.
   void retarget(const SolveSettings& settings) {
     settings_ = settings;
-    solver_->setTargetError(solverTarget());
+    solver_->setTargetError(solverTarget(settings_, draft_error_));
   }
 
   /// Finds out where light is lost, once a solve has come to its end: warnings() names it. Costs nothing where little
@@ -184,20 +184,25 @@ class LitScene {
   void probeSurface(double seconds);
   /// The light has been solved further.
   void forgetSurface() { surface_probe_.forget(); }
+  /// There is no memory to measure it with: not before the light has changed.
+  void giveUpSurface() { surface_probe_.giveUp(); }
+  [[nodiscard]] bool lacksSurface() const { return surface_probe_.isLacking(); }
   /// Nothing: it is not measured.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
   /// Where the program chooses texels: these are not enough, and tell where others are to be finer. Before
-  /// startSolve(). `error`: that is likely to be left by texels; light need not be known much better.
+  /// startSolve(). `error`: that is likely to be left by texels; light need not be known much better. 0: they are to
+  /// stay.
   void setDraft(double error) { draft_error_ = error; }
+  [[nodiscard]] double draftError() const { return draft_error_; }
   [[nodiscard]] bool isDraft() const { return draft_error_ > 0.0; }
-  /// Once surfaceError() is there: how fine texels should be for the target, by surface, as make() takes it.
-  [[nodiscard]] solver::TexelDetail wantedTexels() const;
+  /// Once surfaceError() is there: what texels there should be for the target, about.
+  [[nodiscard]] WantedTexels wantedTexels() const;
 
  private:
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> build(scene::EditedDocument edited,
                                                                const SolveSettings& settings,
                                                                solver::Transport& transport, const LitScene* former,
-                                                               std::vector<float> detail);
+                                                               scene::TexelLayout layout);
   LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
       : document_(std::make_shared<const scene::Document>(std::move(edited.document))),
         settings_(settings),
@@ -232,7 +237,7 @@ class LitScene {
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
   [[nodiscard]] bool reachesDarkSides(const scene::Scene& next, const scene::Sky& sky) const;
   [[nodiscard]] scene::ChartOptions chartOptions() const;
-  [[nodiscard]] double solverTarget() const;
+  void setLayout(scene::TexelLayout layout);
   /// What was built of scene_.
   void take(scene::BuiltScene built);
 
@@ -252,8 +257,8 @@ class LitScene {
   SurfaceProbe surface_probe_;
   bool stale_ = false;
   bool reproducible_ = true;
-  bool has_detail_ = false;                    // texels are finer here than there
-  double draft_error_ = 0.0;                   // and these are to be replaced; 0: they are not
+  scene::TexelLayout layout_;
+  double draft_error_ = 0.0;                   // setDraft()
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                 // that the solver knows of

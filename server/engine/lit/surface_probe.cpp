@@ -4,11 +4,12 @@ namespace radiosity::engine {
 
 void SurfaceProbe::begin(const solver::SolvedScene& solved, std::uint64_t seed,
                          std::span<const scene::LightmapPage> pages) {
-  measuring_ = std::make_unique<solver::SurfaceError>(solver::PlaceLight(solved), seed);
+  auto measuring = std::make_unique<solver::SurfaceError>(solver::PlaceLight(solved), seed);
   std::vector<glm::vec3> found;
-  for (const auto& at : measuring_->lookups())
+  for (const auto& at : measuring->lookups())
     found.push_back(scene::lookUp(solved.patches, pages, at.surface, at.side, at.texel));
-  measuring_->take(std::move(found));
+  measuring->take(std::move(found));
+  measuring_ = std::move(measuring);  // not before it is whole: memory may run out on the way
 }
 
 void SurfaceProbe::advance(double seconds) {

@@ -19,7 +19,14 @@ class SurfaceProbe {
     measuring_.reset();
     stated_.reset();
     measured_.clear();
+    given_up_ = false;
   }
+  void giveUp() {
+    forget();
+    given_up_ = true;
+  }
+  /// Neither measured nor given up.
+  [[nodiscard]] bool isLacking() const { return !stated_ && !given_up_; }
   [[nodiscard]] bool hasBegun() const { return measuring_ != nullptr; }
   /// `solved` is to stay as it is until forget(); lookups are made in `pages`.
   void begin(const solver::SolvedScene& solved, std::uint64_t seed, std::span<const scene::LightmapPage> pages);
@@ -34,6 +41,7 @@ class SurfaceProbe {
   std::unique_ptr<solver::SurfaceError> measuring_;
   std::optional<solver::SurfaceErrorParts> stated_;
   std::vector<solver::SurfaceError::Measured> measured_;
+  bool given_up_ = false;
 };
 
 }  // namespace radiosity::engine

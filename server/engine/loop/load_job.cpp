@@ -100,7 +100,7 @@ Result<std::unique_ptr<LitScene>> LoadJob::makeWhole(scene::Document document) {
 bool LoadJob::wantsFirstLight(const scene::Scene& scene) const {
   if (options_.first_texels == 0) return false;
   scene::ChartOptions charts;
-  charts.texel_budget = options_.settings.texels;
+  charts.texel_budget = texelBudget(options_.settings);
   charts.texel_size_m = options_.settings.texel_size_m;
   const auto leaves = scene::expectedLeaves(scene, charts);
   return leaves > options_.first_light_above && leaves > options_.first_texels && leaves <= scene::kMaxLeaves;

@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -24,18 +25,19 @@ RefineJob::Made RefineJob::layOut() {
   constexpr int kMostTries = 4;
   constexpr double kSpare = 0.97;
   for (int tries = 1;; ++tries) {
-    auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, order_.detail);
+    auto lit = LitScene::make(*order_.document, order_.settings, transport_, order_.limits, order_.layout);
     if (!lit || (*lit)->patchCount() <= order_.settings.texels || tries == kMostTries) return lit;
     const auto part = static_cast<double>(order_.settings.texels) / static_cast<double>((*lit)->patchCount());
-    for (auto& detail : order_.detail) detail *= static_cast<float>(kSpare * std::sqrt(part));
+    for (auto& detail : order_.layout.detail) detail *= static_cast<float>(kSpare * std::sqrt(part));
   }
 }
 
 void RefineJob::run() {
+  const auto begin = std::chrono::steady_clock::now();
   auto made = unlessCancelled(task_, [&]() -> Made {
     auto lit = layOut();
     if (!lit) return lit;
-    if (order_.draft_error > 0.0) (*lit)->setDraft(order_.draft_error);
+    (*lit)->setDraft(order_.draft_error);
     (void)(*lit)->startSolve();  // all that the solve thread need not do
     (*lit)->prepareUpload();
     return lit;
@@ -43,6 +45,7 @@ void RefineJob::run() {
   {
     const std::scoped_lock lock(mutex_);
     made_ = std::move(made);
+    seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   }
   wake_();
 }

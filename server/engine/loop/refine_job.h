@@ -23,8 +23,8 @@ class RefineJob {
     std::shared_ptr<const scene::Document> document;
     SolveSettings settings;
     scene::ImportLimits limits;
-    std::vector<float> detail;  ///< scene::ChartOptions::detail
-    double draft_error = 0.0;   ///< LitScene::setDraft(); 0: it is none
+    scene::TexelLayout layout;
+    double draft_error = 0.0;  ///< LitScene::setDraft()
   };
   using Made = Result<std::unique_ptr<LitScene>>;
 
@@ -34,8 +34,12 @@ class RefineJob {
   RefineJob(const RefineJob&) = delete;
   RefineJob& operator=(const RefineJob&) = delete;
 
+  /// Any thread: it is of no use any more, and ends at its next interruption point.
+  void cancel() { task_.cancel(); }
   /// Nothing: it is not done yet. Once.
   [[nodiscard]] std::optional<Made> take();
+  /// That it took; when it is done.
+  [[nodiscard]] double seconds() const { return seconds_; }
   [[nodiscard]] bool isDone() const;
 
  private:
@@ -48,6 +52,7 @@ class RefineJob {
   Task task_;
   mutable std::mutex mutex_;
   std::optional<Made> made_;
+  double seconds_ = 0.0;
   std::thread thread_;
 };
 

@@ -22,9 +22,6 @@ constexpr int kProgressShare = 10;
 /// A solve that took longer is worth a checkpoint at its end.
 constexpr double kLongSolveSeconds = 2.0;
 
-/// Of measuring what people see, between two looks at what else there is to do.
-constexpr double kProbeSeconds = 0.02;
-
 /// A solve that has come to its time limit takes in what is measured; where that takes longer it stays as it is.
 constexpr double kLimitGrace = 3.0;
 
@@ -101,7 +98,8 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     takeTurn();
   }
   checkpoints_.reset();
-  refinement_.reset();
+  dropRefinement();
+  (void)disposer_.drain();  // while the transport is there
   load_.reset();
   former_load_.reset();
   settling_.reset();
@@ -117,8 +115,9 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 bool SolveLoop::runCommands() {
   std::optional<std::vector<CommandQueue::Command>> due;
   do {
-    waiting_ = settling_ || hasNothingToDo();
-    due = queue_.take(waiting_, settling_ ? kSettlingNap : Upkeep::kInterval);
+    const bool rests = probesSurface() && !isQuiet();
+    waiting_ = settling_ || rests || hasNothingToDo();
+    due = queue_.take(waiting_, settling_ || rests ? kSettlingNap : Upkeep::kInterval);
     beat();
     waiting_ = false;
     if (!due) return false;
@@ -161,13 +160,19 @@ void SolveLoop::takeTurn() {
       solveSlice();
     else if (isBehind())
       catchUp();
-    else if (probesSurface())
+    else if (probesSurface() && isQuiet())
       probeSurface();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
     texels_.forget();
     retired_.reset();
     if (disposer_.drain()) return log::warn("out of memory: what was of no use any more is gone now");
+    if (probesSurface()) {  // what is solved stays
+      lit_->giveUpSurface();
+      return updateStatus(true);
+    }
+    if (refinement_ && refined_times_ < kMostLayouts) return keepTexels("out of memory");
+    if (refinement_) return endRefinement(refinement_->otherwise, refinement_->why);
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
@@ -201,7 +206,7 @@ void SolveLoop::solveSlice() {
     endSolve(SolveState::kFailed);
     return;
   }
-  const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
+  const bool out_of_time = isOutOfTime();
   if (*outcome == solver::StepOutcome::kSlice) {
     if (out_of_time && seconds_ >= *settings_.time_limit_s + kLimitGrace) {
       unpublished_ = true;
@@ -271,13 +276,13 @@ void SolveLoop::catchUp() {
 bool SolveLoop::probesSurface() const {
   const bool is_solved =
       state_ == SolveState::kConverged || state_ == SolveState::kLimited || state_ == SolveState::kTimeLimit;
-  return is_solved && lit_ && !lit_->isStale() && !lit_->surfaceError() && !isBehind();
+  return is_solved && lit_ && !lit_->isStale() && lit_->lacksSurface() && !isBehind();
 }
 
 /// Takes no solve time: what is shown stays what it is.
 void SolveLoop::probeSurface() {
   lit_->probeSurface(kProbeSeconds);
-  if (lit_->surfaceError()) updateStatus(true);
+  if (!lit_->lacksSurface()) updateStatus(true);
 }
 
 void SolveLoop::tellProgress(bool assess) {
@@ -291,7 +296,7 @@ void SolveLoop::tellProgress(bool assess) {
 void SolveLoop::beginSolve() {
   seconds_ = 0.0;
   failure_.clear();
-  refinement_.reset();
+  dropRefinement();
   refined_times_ = 0;
   if (state_ != SolveState::kPaused) state_ = SolveState::kSolving;
   unpublished_ = true;

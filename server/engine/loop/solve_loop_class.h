@@ -133,15 +133,23 @@ class SolveLoop final : public Engine {
     SolveState otherwise;
     std::string why;                 ///< where that is kLimited
     std::unique_ptr<RefineJob> job;  ///< null: it is still being measured
-    Clock::time_point ordered{};
   };
   void beginRefinement(SolveState otherwise, std::string why);
   void refineSlice();
   void judgeTexels();
   void endRefinement(SolveState state, std::string why);
-  void orderRefined(solver::TexelDetail wanted);
+  void orderRefined(WantedTexels wanted);
   void keepTexels(const std::string& why);
   void takeRefined();
+  void dropRefinement();
+  [[nodiscard]] bool isOutOfTime() const { return settings_.time_limit_s && seconds_ >= *settings_.time_limit_s; }
+  /// Layouts after one another: each of the first few halves what is missing, about.
+  static constexpr int kMostLayouts = 4;
+  /// Of measuring what people see, between two looks at what else there is to do.
+  static constexpr double kProbeSeconds = 0.02;
+  /// So long after an edit nothing is measured: the next may be about to come.
+  static constexpr std::chrono::milliseconds kQuiet{300};
+  [[nodiscard]] bool isQuiet() const { return Clock::now() - edit_began_ >= kQuiet; }
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();

@@ -250,6 +250,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     if (lit_ && outcome.affected_surfaces > 0) {
       beginSolve();
     } else {
+      dropRefinement();  // it is of the document before
       updateStatus(true);
     }
     showEdit();
@@ -308,7 +309,7 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool reshaped, bool an
     (void)fitsMemory([&] { lit_->restart(settings_); });
     return beginSolve();
   }
-  refinement_.reset();  // it was for the settings before
+  dropRefinement();  // it was for the settings before
   refined_times_ = 0;
   lit_->retarget(settings_);
   bool other_light = before.sky != settings_.sky;

@@ -261,7 +261,7 @@ void SolveLoop::firstLightSlice() {
 
 /// The whole of a scene cannot be had whose first light was shown: nothing is there, as before.
 void SolveLoop::unload(SolveState state) {
-  refinement_.reset();
+  dropRefinement();
   first_light_.reset();
   former_.reset();
   lit_.reset();

@@ -13,10 +13,6 @@
 namespace radiosity::engine {
 namespace {
 
-/// Layouts after one another: each of the first few halves what is missing, about.
-constexpr int kMostRounds = 4;
-/// Of measuring what people see, between two looks at what else there is to do.
-constexpr double kProbeSeconds = 0.02;
 /// With more of the texels that there may be than this there is no other layout to come.
 constexpr double kNearlyAll = 0.8;
 /// Another layout is worth it where it is to have so many times as many texels.
@@ -36,7 +32,7 @@ void SolveLoop::refineSlice() {
     takeRefined();
   } else {
     lit_->probeSurface(kProbeSeconds);
-    if (lit_->surfaceError()) judgeTexels();
+    if (!lit_->lacksSurface()) judgeTexels();
   }
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
@@ -48,29 +44,28 @@ void SolveLoop::judgeTexels() {
   if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
-  const bool is_worthwhile = lit_->isDraft() || wanted.texels >= kWorthwhile * texels;
-  if (refined_times_ < kMostRounds && is_worthwhile) return orderRefined(std::move(wanted));
+  const bool is_worthwhile = lit_->draftError() > 0.0 || wanted.texels >= kWorthwhile * texels;
+  if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted));
   if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
   endRefinement(SolveState::kLimited, fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface",
                                                   texels, settings_.texels, 100.0 * left));
 }
 
 void SolveLoop::endRefinement(SolveState state, std::string why) {
-  refinement_.reset();
+  dropRefinement();
   failure_ = std::move(why);
   if (!failure_.empty()) log::warn("the solve ends above its target error: {}", failure_);
   endSolve(state);
 }
 
 /// The last layout there can be is no draft.
-void SolveLoop::orderRefined(solver::TexelDetail wanted) {
-  const bool is_last = wanted.error <= settings_.target_error || refined_times_ + 1 == kMostRounds ||
+void SolveLoop::orderRefined(WantedTexels wanted) {
+  const bool is_last = wanted.error <= settings_.target_error || refined_times_ + 1 == kMostLayouts ||
                        wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
   try {
-    RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.of_surface),
+    RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.layout),
                            is_last ? 0.0 : wanted.error};
     refinement_->job = std::make_unique<RefineJob>(std::move(order), *transport_, [this] { queue_.wake(); });
-    refinement_->ordered = Clock::now();
   } catch (const std::system_error& error) {
     keepTexels(error.what());
   }
@@ -79,23 +74,41 @@ void SolveLoop::orderRefined(solver::TexelDetail wanted) {
 /// None take their place: light is solved for as well as was asked for on those that there are.
 void SolveLoop::keepTexels(const std::string& why) {
   log::warn("texels stay as they are: {}", why);
-  refinement_.reset();
-  refined_times_ = kMostRounds;
+  dropRefinement();
+  refined_times_ = kMostLayouts;
   lit_->setDraft(0.0);
   lit_->retarget(settings_);
 }
 
+/// What there is has light; with no time left for more, another layout would be dark.
 void SolveLoop::takeRefined() {
   auto made = refinement_->job->take();
   if (!made) return;
-  seconds_ += std::chrono::duration<double>(Clock::now() - refinement_->ordered).count();
-  refinement_.reset();
+  seconds_ += refinement_->job->seconds();
+  if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
+  dropRefinement();
   ++refined_times_;
-  if (const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit()); !lit)
-    return lit_ && state_ == SolveState::kSolving ? keepTexels(lit.error().text()) : void();
+  const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit());
+  if (!lit) {
+    if (state_ == SolveState::kFailed && lit.error().code == ErrorCode::kUnavailable) {
+      state_ = SolveState::kSolving;
+      if (willRecover(lit.error())) return;
+      state_ = SolveState::kFailed;
+    }
+    return state_ == SolveState::kSolving ? keepTexels(lit.error().text()) : void();
+  }
   unpublished_ = true;
   publishLightmaps(false);
   updateStatus(true);
+}
+
+/// Nobody waits for what a thread is at that lays texels out.
+void SolveLoop::dropRefinement() {
+  if (refinement_ && refinement_->job) {
+    refinement_->job->cancel();
+    disposer_.dispose(std::move(refinement_->job));
+  }
+  refinement_.reset();
 }
 
 }  // namespace radiosity::engine

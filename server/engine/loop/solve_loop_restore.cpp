@@ -172,8 +172,9 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   if (then.gltf.is_discarded()) return fail(ErrorCode::kBadInput, "its document is no JSON");
   auto settings = settings_;
   settings.target_error = head.target_error;
-  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, head.detail, limits_);
+  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, head.layout, limits_);
   if (!lit) return lit;
+  (*lit)->setDraft(head.draft_error);
   (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since

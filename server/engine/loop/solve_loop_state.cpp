@@ -122,7 +122,8 @@ bool SolveLoop::takeCheckpoint() {
   head.gltf = textOf(lit_->document().gltf);
   head.assets = options_.store->digestOf({{}, {}, lit_->document().buffers, lit_->document().images});
   head.sides = lit_->sides();
-  head.detail = lit_->detail();
+  head.layout = lit_->layout();
+  head.draft_error = lit_->draftError();
   CheckpointHead::visit(to, head);
   const bool large = lit_->solver().linkCounters().bytes > 2 * options_.checkpoint_bytes;
   if (!large && !lit_->save(to)) return false;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/engine/engine.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
 #include "server/scene/shading/lit_sides.h"
 #include "server/state/store.h"
@@ -26,13 +27,14 @@ struct CheckpointHead {
   SkySetting sky;
   std::string gltf, assets;   ///< JSON, and a digest of buffers and images
   scene::SideBits sides;      ///< LitScene::sides()
-  std::vector<float> detail;  ///< LitScene::detail()
+  scene::TexelLayout layout;  ///< LitScene::layout()
+  double draft_error = 0.0;   ///< LitScene::draftError()
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
             self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.adaptive, self.gltf, self.assets,
-            self.sides, self.detail);
+            self.sides, self.layout.detail, self.layout.texel_m, self.layout.rough_texel_m, self.draft_error);
   }
 };
 

@@ -63,10 +63,10 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
   }
   if (!named.contains("texels")) {
     if (const auto texels = whole("texels"); texels && *texels > 0) settings.texels = *texels;
-    settings.adaptive = whole("adaptive").value_or(settings.adaptive ? 1 : 0) == 1;
     if (const auto size = real("texelSize"); size && *size >= 0.0 && std::isfinite(*size))
       settings.texel_size_m = *size;
   }
+  if (!named.contains("adaptive")) settings.adaptive = whole("adaptive").value_or(0) == 1;
   if (!named.contains("seed")) settings.seed = whole("seed").value_or(settings.seed);
   if (const auto sky = kept.find("sky"); sky != kept.end() && !named.contains("sky")) settings.sky = skyIn(sky->second);
   if (!named.contains("doubleSided")) settings.double_sided = whole("doubleSided").value_or(0) == 1;

@@ -15,6 +15,14 @@
 
 namespace radiosity::scene {
 
+/// Texels that differ from surface to surface, as wanted by whoever solved the same scene before.
+struct TexelLayout {
+  std::vector<float> detail;                  ///< by surface: Surface::detail
+  double texel_m = 0.0, rough_texel_m = 0.0;  ///< metres: that PatchScene's texel and rough_texel
+
+  [[nodiscard]] bool empty() const { return detail.empty(); }
+};
+
 struct ChartOptions {
   std::uint64_t texel_budget = 24'000;  ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
@@ -22,9 +30,7 @@ struct ChartOptions {
   std::uint32_t gutter = 2;       ///< empty texels between charts
   Sky sky;                        ///< of a scene that names none
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
-  /// By surface of the same scene, built with the same other options: how many times as fine as others its texels are
-  /// (Surface::detail). Empty: all are alike. It adds to the budget, or takes from it.
-  std::vector<float> detail = {};
+  TexelLayout layout = {};        ///< empty: all texels are alike, as many as the budget says
 };
 
 /// A scene as it was before an edit. Refers to its parts.

@@ -65,7 +65,7 @@ class Builder {
       if (ratio > kCoarsest || ratio < 1.0 / kCoarsest) return std::nullopt;
       patches_.texel = former_->patches.texel;
     }
-    shareDetail();
+    if (auto shared = shareDetail(); !shared) return tl::unexpected(shared.error());
     interruptionPoint(2, kBuildSteps);
     auto atlas = layOut(scene_, charts_, patches_.texel, options_, formerPlaces());
     if (!atlas) return tl::unexpected(atlas.error());
@@ -183,7 +183,8 @@ class Builder {
     // Texels are widest where both sides of all that is double-sided turn out to be lit.
     auto charts = charts_;
     for (Chart& chart : charts) chart.back_lit = materialOf(scene_, scene_.instances[chart.instance]).double_sided;
-    const double texel = options_.texel_size_m > 0.0 ? texelSize() : texelSizeFor(charts, options_.texel_budget);
+    const bool is_given = options_.texel_size_m > 0.0 || !options_.layout.empty();
+    const double texel = is_given ? texelSize() : texelSizeFor(charts, options_.texel_budget);
     return bleedingLayouts(scene_, flat_, charts_, texel, options_);
   }
 
@@ -223,6 +224,7 @@ class Builder {
 
   /// Before there are charts: as if all area were covered by whole texels.
   [[nodiscard]] double roughTexelSize() const {
+    if (!options_.layout.empty()) return options_.layout.rough_texel_m / flat_.scale;
     if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
     double area = 0.0;
     for (const FlatTriangle& triangle : flat_.triangles) area += triangle.area;
@@ -234,6 +236,7 @@ class Builder {
   }
 
   [[nodiscard]] double texelSize() const {
+    if (!options_.layout.empty()) return options_.layout.texel_m / flat_.scale;
     if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
     return texelSizeFor(charts_, options_.texel_budget);
   }
@@ -265,14 +268,17 @@ class Builder {
   }
 
   /// What an edit left alone keeps the texels that it has.
-  void shareDetail() {
+  [[nodiscard]] Result<void> shareDetail() {
+    const auto& given = options_.layout.detail;
+    if (former_ == nullptr && !given.empty() && given.size() != charts_.size())
+      return fail(ErrorCode::kInternal, "texels are wanted for other charts than the scene has");
     const auto former = formerSurfaces();
-    const bool given = former_ == nullptr && options_.detail.size() == charts_.size();
     for (std::size_t c = 0; c < charts_.size(); ++c) {
       if (former[c] != nullptr) charts_[c].detail = static_cast<double>(former[c]->detail);
-      if (given) charts_[c].detail = static_cast<double>(options_.detail[c]);
+      if (former_ == nullptr && !given.empty()) charts_[c].detail = static_cast<double>(given[c]);
     }
     shareDetailOfLayouts(charts_);
+    return {};
   }
 
   [[nodiscard]] FormerPlaces formerPlaces() const {

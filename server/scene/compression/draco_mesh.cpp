@@ -16,6 +16,8 @@ namespace {
 
 /// Measured at the peak of decoding a grid of two million faces: up to 80 bytes a face, beside attributes and results.
 constexpr std::uint64_t kBytesAFace = 128;
+/// More of each attribute that the traversal has seams of: a table of its corners, where they are, and vertices.
+constexpr std::uint64_t kBytesAFaceAndSeams = 40;
 /// The only version of which glTF's extension speaks.
 constexpr std::uint16_t kBitstream = DRACO_BITSTREAM_VERSION(2, 2);
 /// Of each point in each attribute: an index of values. And of each component: a whole number, from which it is made.
@@ -30,6 +32,10 @@ struct Fault {
 /// Counts of a stream's connectivity, read ahead of the decoder, which would make tables of that size at once.
 struct Counts {
   std::uint32_t vertices = 0, faces = 0;
+  std::uint8_t seams = 0;  ///< attributes that have some
+  [[nodiscard]] std::uint64_t workingBytes() const {
+    return dracoWorkingBytes(faces) + kBytesAFaceAndSeams * faces * seams;
+  }
 };
 
 bool peekSequential(draco::DecoderBuffer buffer, Counts& counts) {
@@ -39,9 +45,8 @@ bool peekSequential(draco::DecoderBuffer buffer, Counts& counts) {
 /// Behind the counts of vertices and faces stands how often a traversal splits, which makes vertices as well.
 bool peekEdgebreaker(draco::DecoderBuffer buffer, Counts& counts) {
   std::uint32_t vertices = 0, symbols = 0, splits = 0;
-  std::uint8_t attributes = 0;
   const bool all = draco::DecodeVarint(&vertices, &buffer) && draco::DecodeVarint(&counts.faces, &buffer) &&
-                   buffer.Decode(&attributes) && draco::DecodeVarint(&symbols, &buffer) &&
+                   buffer.Decode(&counts.seams) && draco::DecodeVarint(&symbols, &buffer) &&
                    draco::DecodeVarint(&splits, &buffer);
   if (!all || splits > counts.faces || vertices > std::numeric_limits<std::uint32_t>::max() - splits) return false;
   counts.vertices = vertices + splits;
@@ -54,6 +59,9 @@ class BoundedDecoder : public Base {
  public:
   BoundedDecoder(const DracoRequest& request, bool (*peek)(draco::DecoderBuffer, Counts&), Fault& fault)
       : request_(request), peek_(peek), fault_(fault) {}
+
+  /// That decoding all attributes took, asked for or not.
+  [[nodiscard]] std::uint64_t attributeBytes() const { return attribute_bytes_; }
 
  protected:
   bool DecodeConnectivity() override {
@@ -70,11 +78,13 @@ class BoundedDecoder : public Base {
                                                 std::to_string(*request_.faces));
     }
     if (counts.faces > std::numeric_limits<std::int32_t>::max() / 4 ||
-        counts.vertices > 4 * std::uint64_t{counts.faces} || dracoWorkingBytes(counts.faces) > request_.room) {
+        counts.vertices > std::max(4 * std::uint64_t{counts.faces}, std::uint64_t{request_.points}) ||
+        counts.workingBytes() > request_.room) {
       return stop(ErrorCode::kTooLarge, "the stream claims " + std::to_string(counts.faces) + " triangles and " +
-                                            std::to_string(counts.vertices) + " vertices");
+                                            std::to_string(counts.vertices) + " vertices, with seams of " +
+                                            std::to_string(counts.seams) + " attributes");
     }
-    left_ = request_.room - dracoWorkingBytes(counts.faces);
+    left_ = std::min(request_.room - counts.workingBytes(), request_.attribute_room);
     return Base::DecodeConnectivity();
   }
 
@@ -93,6 +103,7 @@ class BoundedDecoder : public Base {
     if (each > left_ / std::max<std::uint64_t>(request_.points, 1))
       return stop(ErrorCode::kTooLarge,
                   "the stream's attributes claim " + std::to_string(each) + " bytes for each vertex");
+    attribute_bytes_ = each * request_.points;
     return Base::DecodeAllAttributes();
   }
 
@@ -105,7 +116,7 @@ class BoundedDecoder : public Base {
   const DracoRequest& request_;
   bool (*peek_)(draco::DecoderBuffer, Counts&);
   Fault& fault_;
-  std::uint64_t left_ = 0;
+  std::uint64_t left_ = 0, attribute_bytes_ = 0;
 };
 
 /// Whether no more bits tell how texture coordinates turn than there are values of them. `buffer` stands behind the
@@ -155,7 +166,8 @@ class Edgebreaker : public BoundedDecoder<draco::MeshEdgebreakerDecoder> {
   }
 };
 
-Result<void> decodeInto(std::span<const std::uint8_t> stream, const DracoRequest& request, draco::Mesh& mesh) {
+/// Returns what decoding its attributes took.
+Result<std::uint64_t> decodeInto(std::span<const std::uint8_t> stream, const DracoRequest& request, draco::Mesh& mesh) {
   const auto bad = [&](ErrorCode code, std::string text) { return fail(code, std::move(text), request.where); };
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(stream.data()), stream.size());
@@ -168,15 +180,20 @@ Result<void> decodeInto(std::span<const std::uint8_t> stream, const DracoRequest
   Fault fault;
   const draco::DecoderOptions options;
   draco::Status status;
+  std::uint64_t bytes = 0;
+  const auto decode = [&](auto&& decoder) {
+    status = decoder.Decode(options, &buffer, &mesh);
+    bytes = decoder.attributeBytes();
+  };
   if (header.encoder_method == draco::MESH_SEQUENTIAL_ENCODING) {
-    status = Sequential(request, peekSequential, fault).Decode(options, &buffer, &mesh);
+    decode(Sequential(request, peekSequential, fault));
   } else if (header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING) {
-    status = Edgebreaker(request, fault).Decode(options, &buffer, &mesh);
+    decode(Edgebreaker(request, fault));
   } else {
     return bad(ErrorCode::kUnsupported, "is coded by a method that Draco 1.5.5 does not know");
   }
   if (!fault.text.empty()) return bad(fault.code, std::move(fault.text));
-  if (status.ok()) return {};
+  if (status.ok()) return bytes;
   return bad(ErrorCode::kBadInput, "the Draco stream cannot be decoded: " + status.error_msg_string());
 }
 
@@ -216,8 +233,6 @@ int componentTypeOf(draco::DataType type) {
   }
 }
 
-std::size_t bytesOf(int component_type) { return component_type <= 5121 ? 1 : component_type <= 5123 ? 2 : 4; }
-
 template <typename T>
 std::int64_t loadAs(const std::uint8_t* from) {
   T value;
@@ -245,10 +260,10 @@ std::int64_t loadInteger(const std::uint8_t* from, int type) {
 /// Little end first, as all of glTF. False: it does not fit.
 bool storeInteger(std::int64_t value, int type, std::uint8_t* to) {
   const bool is_signed = type == 5120 || type == 5122;
-  const auto bits = 8 * bytesOf(type);
+  const auto bits = 8 * componentBytes(type);
   const auto most = (std::int64_t{1} << (bits - (is_signed ? 1 : 0))) - 1;
   if (value > most || value < (is_signed ? -most - 1 : 0)) return false;
-  for (std::size_t i = 0; i < bytesOf(type); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
+  for (std::size_t i = 0; i < componentBytes(type); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
   return true;
 }
 
@@ -271,27 +286,27 @@ class AttributeReader {
     if (attribute_->buffer() == nullptr || attribute_->byte_offset() != 0 ||
         attribute_->buffer()->data_size() < values * stride)
       return bad(where_, "the Draco stream has too few values");
-    Bytes out(mesh_.num_points() * asked_.components * bytesOf(asked_.component_type));
+    Bytes out(mesh_.num_points() * asked_.components * componentBytes(asked_.component_type));
     auto* to = out.data();
     for (std::uint32_t p = 0; p < mesh_.num_points(); ++p) {
       const auto value = attribute_->mapped_index(draco::PointIndex(p));
       if (value.value() >= values) return bad(where_, "the Draco stream has too few values");
       if (!copyElement(attribute_->buffer()->data() + value.value() * stride, to))
         return bad(asked_.where, "numbers of the Draco stream do not fit its component type");
-      to += asked_.components * bytesOf(asked_.component_type);
+      to += asked_.components * componentBytes(asked_.component_type);
     }
     return out;
   }
 
  private:
   bool copyElement(const std::uint8_t* from, std::uint8_t* to) const {
-    const auto size = bytesOf(asked_.component_type);
+    const auto size = componentBytes(asked_.component_type);
     if (type_ == asked_.component_type) {
       std::memcpy(to, from, asked_.components * size);
       return true;
     }
     for (std::size_t c = 0; c < asked_.components; ++c)
-      if (!storeInteger(loadInteger(from + c * bytesOf(type_), type_), asked_.component_type, to + c * size))
+      if (!storeInteger(loadInteger(from + c * componentBytes(type_), type_), asked_.component_type, to + c * size))
         return false;
     return true;
   }
@@ -309,14 +324,17 @@ class AttributeReader {
 
 }  // namespace
 
+std::size_t componentBytes(int component_type) { return component_type <= 5121 ? 1 : component_type <= 5123 ? 2 : 4; }
+
 std::uint64_t dracoWorkingBytes(std::uint64_t faces) { return kBytesAFace * faces; }
 
 Result<DracoMesh> decodeDraco(std::span<const std::uint8_t> stream, const DracoRequest& request) {
   draco::Mesh mesh;
-  if (auto ok = decodeInto(stream, request, mesh); !ok) return tl::unexpected(ok.error());
+  const auto bytes = decodeInto(stream, request, mesh);
+  if (!bytes) return tl::unexpected(bytes.error());
   auto corners = cornersOf(mesh, request);
   if (!corners) return tl::unexpected(corners.error());
-  DracoMesh out{std::move(*corners), {}};
+  DracoMesh out{std::move(*corners), {}, *bytes};
   for (const auto& asked : request.attributes) {
     auto values = AttributeReader(mesh, asked, request.where).read();
     if (!values) return tl::unexpected(values.error());

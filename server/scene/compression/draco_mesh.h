@@ -27,13 +27,18 @@ struct DracoRequest {
   std::size_t points = 0;            ///< that each attribute has
   std::optional<std::size_t> faces;  ///< none: not declared
   std::uint64_t room = 0;            ///< bytes that decoding may take, its own working memory included
+  std::uint64_t attribute_room = 0;  ///< likewise of attributes alone, whether anybody asks for them or not
   std::string where;                 ///< of the extension, for messages
 };
 
 struct DracoMesh {
   std::vector<std::uint32_t> corners;  ///< three a face, each below DracoRequest::points
   std::vector<Bytes> attributes;       ///< as asked for: elements one after the other, of the type declared
+  std::uint64_t attribute_bytes = 0;   ///< that decoding all of the stream's took
 };
+
+/// Of one of glTF's component types, 5120 to 5126.
+[[nodiscard]] std::size_t componentBytes(int component_type);
 
 /// Bytes that decoding takes at its peak, about, for so many faces: tables of corners, symbols and traversals.
 [[nodiscard]] std::uint64_t dracoWorkingBytes(std::uint64_t faces);

@@ -18,13 +18,14 @@ DecodedBuffer::DecodedBuffer(const Document& document, const ImportLimits& limit
     : index_(document.buffers.size()), most_(limits.max_file_bytes) {
   std::uint64_t bytes_of_data = 0;
   for (const auto& buffer : document.buffers) bytes_of_data += buffer->size();
+  bytes_ = std::min(bytes_of_data, most_);
   memory_ = std::min(sceneMemoryLimit(limits), likelySceneBytes(limits, bytes_of_data));
 }
 
 Result<void> DecodedBuffer::claim(std::uint64_t bytes, std::uint64_t working, const std::string& where) {
   if (bytes > most_ - bytes_) {
     return fail(ErrorCode::kTooLarge,
-                "geometry would have more than " + std::to_string(most_) + " bytes once it is decoded", where);
+                "buffers would have more than " + std::to_string(most_) + " bytes once geometry is decoded", where);
   }
   bytes_ += bytes;
   const auto wanted = claimed_ + kCopies * (bytes + kAlignment) + working;

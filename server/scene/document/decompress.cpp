@@ -27,13 +27,6 @@ bool isOurs(const Json& name) {
   return name.is_string() && std::ranges::find(kNames, name.get_ref<const std::string&>()) != kNames.end();
 }
 
-/// Of JSON that may be anything.
-const Json* memberOf(const Json& object, const char* name) {
-  if (!object.is_object()) return nullptr;
-  const auto found = object.find(name);
-  return found == object.end() ? nullptr : &*found;
-}
-
 bool hasOurs(const Json& object) {
   const auto* extensions = memberOf(object, "extensions");
   return extensions != nullptr && std::ranges::any_of(kNames, [&](std::string_view name) {
@@ -245,13 +238,18 @@ bool isFallbackBuffer(const Json& buffer) {
          });
 }
 
-bool isPlaceForDecoded(const Json& gltf, std::size_t buffer) {
-  if (memberOf(gltf["buffers"][buffer], "uri") != nullptr) return false;
-  const auto* views = memberOf(gltf, "bufferViews");
-  return views != nullptr && views->is_array() && std::ranges::any_of(*views, [&](const Json& view) {
-           const auto* of = memberOf(view, "buffer");
-           return of != nullptr && *of == buffer && hasOurs(view);
-         });
+std::vector<bool> placesForDecoded(const Json& gltf) {
+  const auto *buffers = memberOf(gltf, "buffers"), *views = memberOf(gltf, "bufferViews");
+  std::vector<bool> places(buffers != nullptr && buffers->is_array() ? buffers->size() : 0, false);
+  if (views == nullptr || !views->is_array()) return places;
+  for (const auto& view : *views) {
+    const auto* of = memberOf(view, "buffer");
+    if (of == nullptr || !of->is_number_integer() || of->get<std::uint64_t>() >= places.size() || !hasOurs(view))
+      continue;
+    const auto buffer = of->get<std::size_t>();
+    places[buffer] = memberOf((*buffers)[buffer], "uri") == nullptr;
+  }
+  return places;
 }
 
 Result<void> decompressGeometry(Document& document, std::size_t first_buffer, const ImportLimits& limits) {

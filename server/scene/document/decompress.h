@@ -5,6 +5,8 @@
 
 #include <cstddef>
 
+#include <vector>
+
 #include "common/result.h"
 #include "server/scene/document/document.h"
 #include "server/scene/document/json_text.h"
@@ -17,8 +19,9 @@ namespace radiosity::scene {
 /// Whether a buffer need not be read: all its views are there in compressed form. Its JSON may be anything.
 [[nodiscard]] bool isFallbackBuffer(const Json& buffer);
 
-/// Whether a buffer has no data, but views whose compressed form lies elsewhere. The JSON may be anything.
-[[nodiscard]] bool isPlaceForDecoded(const Json& gltf, std::size_t buffer);
+/// By buffer, whether it has no data, but views whose compressed form lies elsewhere. The JSON may be anything.
+/// O(views).
+[[nodiscard]] std::vector<bool> placesForDecoded(const Json& gltf);
 
 /// Of a checked document whose buffers are there (those without data are empty) and whose images are not. Buffers from
 /// `first_buffer` on that held compressed geometry are replaced by one that holds it decoded, and whatever else was in

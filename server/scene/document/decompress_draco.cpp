@@ -14,10 +14,6 @@ constexpr int kTriangles = 4, kStrip = 5;
 constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 constexpr std::size_t kAlignment = 4;  ///< of vertex data
 
-std::size_t bytesOf(int component_type) {
-  return component_type <= kUnsignedByte ? 1 : component_type <= kUnsignedShort ? 2 : 4;
-}
-
 /// 0: a matrix, which no attribute of ours is.
 std::size_t componentsOf(const Json& accessor) {
   constexpr std::array kTypes = {"SCALAR", "VEC2", "VEC3", "VEC4"};
@@ -53,7 +49,7 @@ double load(const std::uint8_t* from, int component_type) {
 void setBounds(Json& accessor, const Bytes& values) {
   if (!accessor.contains("min") && !accessor.contains("max")) return;
   const auto type = accessor["componentType"].get<int>();
-  const auto components = componentsOf(accessor), size = bytesOf(type);
+  const auto components = componentsOf(accessor), size = componentBytes(type);
   std::vector<double> low(components, std::numeric_limits<double>::max());
   std::vector<double> high(components, std::numeric_limits<double>::lowest());
   for (std::size_t i = 0; i < values.size() / size; ++i) {
@@ -74,7 +70,7 @@ Bytes padded(const Bytes& values, std::size_t element, std::size_t stride) {
 }
 
 std::size_t strideOf(const Json& accessor) {
-  const auto element = componentsOf(accessor) * bytesOf(accessor["componentType"].get<int>());
+  const auto element = componentsOf(accessor) * componentBytes(accessor["componentType"].get<int>());
   return (element + kAlignment - 1) / kAlignment * kAlignment;
 }
 
@@ -170,7 +166,7 @@ Json& DracoPrimitives::fill(const Key& key, Bytes bytes, Json view) {
 
 void DracoPrimitives::addAttribute(const Key& key, const Bytes& values) {
   const auto& declared = document_.gltf["accessors"][std::get<2>(key)];
-  const auto element = componentsOf(declared) * bytesOf(declared["componentType"].get<int>());
+  const auto element = componentsOf(declared) * componentBytes(declared["componentType"].get<int>());
   const auto stride = strideOf(declared);
   auto& accessor = fill(key, padded(values, element, stride), {{"byteStride", stride}, {"target", kArrayBuffer}});
   setBounds(accessor, values);
@@ -180,7 +176,7 @@ Result<void> DracoPrimitives::addIndices(const Key& key, const DracoMesh& mesh, 
   const auto declared = std::get<2>(key);
   const auto type =
       declared == kNone ? kUnsignedInt : document_.gltf["accessors"][declared]["componentType"].get<int>();
-  const auto size = bytesOf(type);
+  const auto size = componentBytes(type);
   if (size < 4 && points > std::size_t{1} << (8 * size)) {
     return fail(ErrorCode::kInvalidScene, "is too narrow for indices of " + std::to_string(points) + " vertices",
                 at("/accessors/" + std::to_string(declared) + "/componentType"));
@@ -207,8 +203,10 @@ Result<void> DracoPrimitives::decodeInto(std::size_t view, const std::vector<Wan
     if (one.id != kIndices) bytes += request->points * strideOf(document_.gltf["accessors"][one.accessor]);
   if (auto ok = out_.claim(bytes, dracoWorkingBytes(request->faces.value_or(0)), request->where); !ok) return ok;
   request->room = out_.room();
+  request->attribute_room = attribute_room_;
   const auto mesh = decodeDraco(*stream, *request);
   if (!mesh) return tl::unexpected(mesh.error());
+  attribute_room_ -= mesh->attribute_bytes;
   if (!request->faces) {  // known only now
     if (auto ok = out_.claim(4 * mesh->corners.size(), 0, request->where); !ok) return ok;
   }

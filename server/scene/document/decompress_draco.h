@@ -21,7 +21,8 @@ class DracoPrimitives {
  public:
   static constexpr const char* kName = "KHR_draco_mesh_compression";
 
-  DracoPrimitives(Document& document, DecodedBuffer& out) : document_(document), out_(out) {}
+  DracoPrimitives(Document& document, DecodedBuffer& out)
+      : document_(document), out_(out), attribute_room_(kAttributeRooms * out.room()) {}
 
   /// Of a checked document. `pointer`: of the primitive.
   [[nodiscard]] Result<void> decode(Json& primitive, const std::string& pointer);
@@ -32,6 +33,9 @@ class DracoPrimitives {
   void reuse(std::size_t view);
 
  private:
+  /// All streams together may have so many times as many bytes of attributes as geometry may, once it is decoded: a
+  /// short stream may have many that nobody asks for, and many primitives may name it.
+  static constexpr std::uint64_t kAttributeRooms = 2;
   /// A stream's attribute, or its indices, and the accessor that declares it; both may serve many primitives.
   struct Wanted {
     std::string name;  ///< "" for indices
@@ -56,6 +60,7 @@ class DracoPrimitives {
 
   Document& document_;
   DecodedBuffer& out_;
+  std::uint64_t attribute_room_;
   std::map<Key, std::size_t> done_;  ///< the accessors that have the data
   std::set<std::size_t> filled_;     ///< accessors that were given data
   std::set<std::size_t> views_;

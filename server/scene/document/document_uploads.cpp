@@ -21,9 +21,10 @@ class Attacher {
     const auto first = document_.buffers.size();
     const bool compressed = hasCompressedGeometry(document_.gltf);
     if (count("buffers") <= first && count("images") <= document_.images.size() && !compressed) return {};
+    const auto empty = placesForDecoded(document_.gltf);
     for (auto i = document_.buffers.size(); i < count("buffers"); ++i) {
       auto& entry = document_.gltf["buffers"][i];
-      const bool is_empty = isFallbackBuffer(entry) || isPlaceForDecoded(document_.gltf, i);
+      const bool is_empty = isFallbackBuffer(entry) || empty[i];
       auto ok = is_empty ? keep(document_.buffers, std::make_shared<const Bytes>(), at("buffers", i))
                          : buffer(entry, at("buffers", i));
       if (!ok) return ok;

@@ -1,6 +1,7 @@
 #include "server/scene/document/image_decode.h"
 
 #include <stb_image.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -9,9 +10,14 @@
 #include <glm/vec2.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "common/parallel.h"
+#include "common/task.h"
 #include "server/scene/document/webp.h"
 #include "server/scene/values/shade_texture.h"
 
@@ -153,12 +159,74 @@ bool isDeepPng(const Bytes& bytes) {
 /// Progressive pictures have ten or so. Each is a walk over all blocks, even where it says nothing in a hundred bytes.
 constexpr std::ptrdiff_t kMostScans = 256;
 
-/// Those of a thumbnail in its head are counted as well.
+/// Of the picture alone: neither those of a thumbnail in a segment of its head, nor what follows its end.
 std::ptrdiff_t scansOfJpeg(const Bytes& bytes) {
   if (sniffImageType(bytes) != "image/jpeg") return 0;
+  constexpr std::uint8_t kStuffed = 0x00, kFirstRestart = 0xD0, kLastRestart = 0xD7, kEnd = 0xD9, kScan = 0xDA;
   std::ptrdiff_t count = 0;
-  for (std::size_t i = 1; i < bytes.size(); ++i) count += bytes[i - 1] == 0xFF && bytes[i] == 0xDA ? 1 : 0;
+  for (std::size_t i = 2; i + 3 < bytes.size();) {
+    const auto code = bytes[i + 1];
+    const bool is_marker = bytes[i] == 0xFF && code != kStuffed && code != 0xFF && code != 0x01 &&
+                           !(code >= kFirstRestart && code <= kLastRestart);
+    if (!is_marker) {  // data of a scan, or filling
+      ++i;
+      continue;
+    }
+    if (code == kEnd) break;
+    count += code == kScan ? 1 : 0;
+    i += 2 + (std::size_t{bytes[i + 2]} << 8U | bytes[i + 3]);
+  }
   return count;
+}
+
+/// Of the chunk that begins at `at`; nothing: it is not whole.
+struct PngChunk {
+  std::string_view type;
+  std::span<const std::uint8_t> data;
+};
+std::optional<PngChunk> pngChunkAt(const Bytes& bytes, std::size_t at) {
+  constexpr std::size_t kHead = 8;
+  if (bytes.size() < at + kHead) return std::nullopt;
+  const auto length = std::size_t{bytes[at]} << 24U | std::size_t{bytes[at + 1]} << 16U |
+                      std::size_t{bytes[at + 2]} << 8U | bytes[at + 3];
+  if (length > bytes.size() - at - kHead) return std::nullopt;
+  return PngChunk{{reinterpret_cast<const char*>(&bytes[at + 4]), 4}, std::span(bytes).subspan(at + kHead, length)};
+}
+
+/// Whether a PNG inflates to more than `most` bytes. stb_image would inflate two gigabytes of a picture of one pixel
+/// before it looks how many it needs. What is broken inflates to what can be had of it. O(bytes there and inflated).
+bool inflatesBeyond(const Bytes& bytes, std::uint64_t most) {
+  constexpr std::size_t kSignature = 8, kBesideData = 12, kScratch = std::size_t{1} << 16U;
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) return false;
+  std::vector<std::uint8_t> scratch(kScratch);
+  bool beyond = false;
+  int status = Z_OK;
+  for (std::size_t at = kSignature; status == Z_OK && !beyond;) {
+    const auto chunk = pngChunkAt(bytes, at);
+    if (!chunk || chunk->type == "IEND") break;
+    at += kBesideData + chunk->data.size();
+    if (chunk->type != "IDAT") continue;
+    stream.next_in = const_cast<Bytef*>(chunk->data.data());  // zlib only reads it
+    stream.avail_in = static_cast<uInt>(chunk->data.size());
+    while (status == Z_OK && !beyond && (stream.avail_in > 0 || stream.avail_out == 0)) {
+      interruptionPoint();
+      stream.next_out = scratch.data();
+      stream.avail_out = static_cast<uInt>(scratch.size());
+      status = inflate(&stream, Z_NO_FLUSH);
+      beyond = stream.total_out > most;
+    }
+    if (status == Z_BUF_ERROR) status = Z_OK;  // more is to come
+  }
+  (void)inflateEnd(&stream);
+  return beyond;
+}
+
+/// What the pixels of a PNG take before they are filtered back, twice: interlaced ones have more rows, and some files
+/// have a little more than they need.
+std::uint64_t mostInflated(const ImageSize& size, bool deep) {
+  constexpr std::uint64_t kSpare = std::uint64_t{1} << 16U, kChannels = 4;
+  return 2 * size.height * (kChannels * (deep ? 2 : 1) * size.width + 1) + kSpare;
 }
 
 }  // namespace
@@ -201,6 +269,8 @@ Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const 
 Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where, const ImageUse& use) {
   const auto size = sizeOfImage(bytes, max_pixels, where);
   if (!size) return tl::unexpected(size.error());
+  if (sniffImageType(bytes) == "image/png" && inflatesBeyond(bytes, mostInflated(*size, isDeepPng(bytes))))
+    return fail(ErrorCode::kTooLarge, "image has more data than pixels", where);
   int width = 0, height = 0, channels = 0;
   const bool webp = isWebp(bytes);
   auto rgba =

@@ -29,6 +29,13 @@ using Json = nlohmann::json;
 /// "room.glb: /accessors/4".
 [[nodiscard]] std::string place(const std::string& name, std::string_view pointer);
 
+/// A member of JSON that may be anything; null: there is none.
+[[nodiscard]] inline const Json* memberOf(const Json& object, const char* name) {
+  if (!object.is_object()) return nullptr;
+  const auto found = object.find(name);
+  return found == object.end() ? nullptr : &*found;
+}
+
 /// An extension object of a checked JSON object, or null.
 [[nodiscard]] inline const Json* extensionOf(const Json& object, const char* name) {
   const auto extensions = object.find("extensions");

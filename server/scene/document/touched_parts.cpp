@@ -9,11 +9,6 @@ namespace {
 
 constexpr const char *kNodes = "nodes", *kMaterials = "materials", *kExtensions = "extensions";
 
-const Json* memberOf(const Json& document, const char* member) {
-  const auto found = document.find(member);
-  return found == document.end() ? nullptr : &*found;
-}
-
 bool isSame(const Json* before, const Json* after) {
   return before == nullptr || after == nullptr ? before == after : isIdentical(*before, *after);
 }

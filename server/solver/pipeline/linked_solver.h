@@ -62,7 +62,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool isUnsettled() const override { return from_links_ == FromLinks::kAfterEdit; }
   /// When all links are there, the light over them is still to be solved for.
   [[nodiscard]] bool isBehind() const override {
-    return lacksLinks() || (phase_ == Phase::kDone && from_links_ == FromLinks::kToConfirm);
+    return lacksLinks() ||
+           (phase_ == Phase::kDone && (from_links_ == FromLinks::kToConfirm || assessing_ != Assessed::kNothing));
   }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;

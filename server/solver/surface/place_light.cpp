@@ -19,6 +19,8 @@ constexpr std::uint32_t kDraws = 64;
 /// Points on a lamp that look first, and so many where these do not agree.
 constexpr std::uint32_t kFirstLooks = 8, kAllLooks = PlaceLight::kMostLooks;
 static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPacket == 0);
+/// Where the first agree the others are asked with this chance.
+constexpr double kAskAgain = 0.25;
 /// Ways to a lamp end so far before it (unit box), well above the rounding of positions.
 constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
@@ -75,14 +77,14 @@ PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) co
 }
 
 glm::dvec3 PlaceLight::arriving(const Spot& spot, std::uint64_t key) const {
-  return direct(spot, mixKeys(key, 1)) + reflected(spot, mixKeys(key, 2), kRays, kMostSteps);
+  return direct(spot, mixKeys(key, 1)) + reflected(spot, mixKeys(key, 2));
 }
 
 /// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
-glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays, std::size_t steps) const {
+glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key) const {
   const Sobol4 draws(key);
   RayOrder order;
-  for (std::uint32_t k = 0; k < rays; ++k) order.add(k, draws(k));
+  for (std::uint32_t k = 0; k < kRays; ++k) order.add(k, draws(k));
   order.sort();
   std::array<LeafRays::Place, geometry::kPacket> from;
   from.fill(spot.place);
@@ -102,10 +104,18 @@ glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint3
       const auto of_ray = mixKeys(key, order[first + i].number);
       LeafRays::Place end;
       const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
-      sum += weight * leaving(value, end, of_ray, steps);
+      sum += weight * leaving(value, end, of_ray, kMostSteps);
     }
   }
-  return sum / static_cast<double>(rays);
+  return sum / static_cast<double>(kRays);
+}
+
+/// By one ray.
+glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const {
+  const auto draw = sobol4(0, key);
+  LeafRays::Place end;
+  const auto value = rays_->see(spot.place, cosineDirection(spot.place.normal, draw.x, draw.y), key, end);
+  return leaving(value, end, key, steps);
 }
 
 /// Towards whoever sees it there: of a leaf that something cuts the light of that very place.
@@ -115,7 +125,7 @@ glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, 
   if (value == LeafRays::kNothing) return glm::dvec3(0.0);
   if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
-  const auto arrives = direct(there, mixKeys(key, 3)) + reflected(there, mixKeys(key, 4), 1, steps - 1);
+  const auto arrives = direct(there, mixKeys(key, 3)) + reflectedBy(there, mixKeys(key, 4), steps - 1);
   return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;
 }
 
@@ -147,7 +157,11 @@ double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uin
   std::array<double, 2> weights{};
   const double first = seenPart(lamp, spot, key, 0, kFirstLooks, weights);
   const bool agree = first <= 0.0 || first >= 1.0;
-  return factors.shading * (agree ? first : seenPart(lamp, spot, key, kFirstLooks, kAllLooks, weights));
+  if (agree && uniformFromKey(key) >= kAskAgain) return factors.shading * first;
+  const double all = seenPart(lamp, spot, key, kFirstLooks, kAllLooks, weights);
+  // Those that are asked although the first agree stand for those that are not: else what lies just within the edge of
+  // a shadow would count as all dark, or all lit, too often.
+  return factors.shading * (agree ? first + (all - first) / kAskAgain : all);
 }
 
 /// By points first .. end - 1 of the lamp, and by what `weights` has of others: of what is seen, of all.

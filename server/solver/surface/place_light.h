@@ -57,7 +57,8 @@ class PlaceLight {
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
 
  private:
-  [[nodiscard]] glm::dvec3 reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays, std::size_t steps) const;
+  [[nodiscard]] glm::dvec3 reflected(const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
   [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key) const;

@@ -17,6 +17,8 @@ constexpr double kEven = 0.003, kEdge = 0.08;
 constexpr double kEvenPower = 4.0, kEdgePower = 1.0;
 /// One round makes texels at most so many times as fine, or as coarse: what they hide is known no better.
 constexpr double kFinest = 8.0, kCoarsest = 0.5;
+/// Texels are at most so many times as fine as PatchScene::texel, or as coarse.
+constexpr double kMostDetail = 64.0, kLeastDetail = 0.5;
 /// With fewer of them nothing would be known of what coarser ones hide.
 constexpr double kFewTexels = 64.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
@@ -75,7 +77,8 @@ struct Grid {
 
 /// What is known of a surface, of both its sides.
 struct Need {
-  double texels = 0.0;
+  double texels = 0.0;                   ///< with area
+  double detail = 1.0;                   ///< Surface::detail
   double square = 0.0, noise = 0.0;      ///< area times irradiance squared, and the noise of its mean
   std::array<Bend, 2> along, along_two;  ///< by axis; of texels, and of blocks of two by two
   double power = 0.0;                    ///< of the size of texels
@@ -109,6 +112,7 @@ class DetailChooser {
       : patches_(patches), needs_(patches.surfaces.size()) {
     for (std::size_t s = 0; s < needs_.size(); ++s) {
       const auto& surface = patches.surfaces[s];
+      needs_[s].detail = static_cast<double>(surface.detail);
       for (const auto node : surface.first_node)
         if (node != scene::kNone) look(surface, node, {first, second}, needs_[s]);
       square_ += needs_[s].square;
@@ -147,7 +151,7 @@ class DetailChooser {
     }
     TexelDetail chosen;
     const double gain = sumsAt(high).texels > goal.most_texels && low > 0.0 ? low : high;
-    for (const auto& need : needs_) chosen.of_surface.push_back(static_cast<float>(detailAt(need, gain)));
+    for (const auto& need : needs_) chosen.of_surface.push_back(static_cast<float>(need.detail * detailAt(need, gain)));
     const auto sums = sumsAt(gain);
     chosen.error = square_ > 0.0 ? std::sqrt(sums.error / square_) : 0.0;
     chosen.texels = sums.texels;
@@ -168,12 +172,12 @@ class DetailChooser {
       const auto area = static_cast<double>(patches_.node_area[node + i]);
       const glm::dvec3 one(light[0][node + i]), other(light[1][node + i]);
       grid.area.push_back(area);
+      need.texels += area > 0.0 ? 1.0 : 0.0;
       grid.light[0].push_back(one);
       grid.light[1].push_back(other);
       need.square += area * glm::dot(one, other);
       need.noise += 0.25 * area * glm::dot(one - other, one - other);
     }
-    need.texels += static_cast<double>(count);
     const auto coarse = grid.coarser();
     for (std::uint32_t axis = 0; axis < 2; ++axis) {
       grid.addBends(axis == 0 ? 1 : 0, axis, need.along[axis]);
@@ -206,14 +210,16 @@ class DetailChooser {
     double error = 0.0, texels = 0.0;
   };
   /// `gain`: a texel more is worth what lowers the error by one in so many.
+  /// Beside those that there are.
   [[nodiscard]] static double detailAt(const Need& need, double gain) {
     if (need.texels <= 0.0) return 1.0;
-    const double coarsest = need.texels >= kFewTexels ? kCoarsest : 1.0;
+    const double finest = std::clamp(kMostDetail / need.detail, 1.0, kFinest);
+    const double coarsest = need.texels >= kFewTexels ? std::clamp(kLeastDetail / need.detail, kCoarsest, 1.0) : 1.0;
     const auto with = [&](double power) {
       return std::pow(gain * power * need.error / need.texels, 1.0 / (power + 2.0));
     };
     const double finer = with(need.power);
-    return finer >= 1.0 ? std::min(finer, kFinest) : std::clamp(with(kEvenPower), coarsest, 1.0);
+    return finer >= 1.0 ? std::min(finer, finest) : std::clamp(with(kEvenPower), coarsest, 1.0);
   }
   /// Coarser texels begin to hide what these still show.
   [[nodiscard]] static double errorAt(const Need& need, double detail) {

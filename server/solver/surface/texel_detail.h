@@ -22,7 +22,7 @@ struct DetailGoal {
 };
 
 struct TexelDetail {
-  std::vector<float> of_surface;  ///< how many times as fine as they are
+  std::vector<float> of_surface;  ///< Surface::detail that each should have
   double error = 0.0;             ///< that is likely to be left, by texels alone
   double texels = 0.0;            ///< that surfaces have then, about
 };

@@ -46,12 +46,16 @@ TEST_F(Adaptive, WithFixedTexelsTheErrorAtTheSurfaceIsToldOnceItIsMeasured) {
   EXPECT_GE(status().surface_error->p95, 0.0);
 }
 
-TEST_F(Adaptive, AnEditMakesItUnknownUntilItIsMeasuredAgain) {
+TEST_F(Adaptive, AnEditOfLightMakesItUnknownUntilItIsMeasuredAgain) {
   solve(lumpedCube(0.5));
   ASSERT_TRUE(isMeasured());
-  ASSERT_TRUE(configure([](SolveSettings& settings) { settings.target_error = kNever; }));
-  EXPECT_EQ(status().state, SolveState::kSolving);
-  EXPECT_FALSE(status().probes_surface);
+  recorder_->forget();
+  ASSERT_TRUE(call<engine::PatchOutcome>(
+      [&](auto done) { engine().patch({.patch = emissionPatch(1, 2.0), .by = "test"}, done); }));
+  ASSERT_TRUE(eventually([&] { return status().revision == 2 && status().surface_error; }));
+  const auto told = recorder_->progress();
+  ASSERT_FALSE(told.empty());
+  EXPECT_FALSE(told.front().surface_error) << "that of the light before";
 }
 
 TEST_F(Adaptive, TheTargetIsMetAtTheSurface) {
@@ -79,9 +83,38 @@ TEST_F(Adaptive, AnEditWhileTexelsAreChosenIsNotLost) {
       [&](auto done) { engine().patch({.patch = emissionPatch(1, 2.0), .by = "test"}, done); });
   ASSERT_TRUE(edited);
   EXPECT_EQ(edited->revision, 2U);
+  const auto edited_text = sceneText();
   ASSERT_TRUE(isMeasured());
+  EXPECT_EQ(sceneText(), edited_text);
   EXPECT_EQ(status().state, SolveState::kConverged);
   EXPECT_EQ(status().revision, 2U);
+}
+
+// What changes no light goes on with the solve: a layout of the document before must not bring that back.
+TEST_F(Adaptive, ANameGivenWhileTexelsAreChosenIsNotLost) {
+  choose(0.05);
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  for (std::uint64_t revision = 2; status().state == SolveState::kSolving && revision < 50; ++revision) {
+    const auto patch = R"([{"op":"add","path":"/nodes/0/name","value":"named )" + std::to_string(revision) + R"("}])";
+    ASSERT_TRUE(call<engine::PatchOutcome>([&](auto done) { engine().patch({.patch = patch, .by = "test"}, done); }));
+    EXPECT_THAT(sceneText(), testing::HasSubstr("named " + std::to_string(revision)));
+  }
+  const auto last = sceneText();
+  ASSERT_TRUE(isMeasured());
+  EXPECT_EQ(sceneText(), last);
+}
+
+TEST_F(Adaptive, TimeThatIsPausedIsNoSolveTime) {
+  constexpr double kPaused = 0.4;
+  choose(0.05);
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(call<SolveState>([&](auto done) { engine().pause(done); }));
+  std::this_thread::sleep_for(std::chrono::duration<double>(kPaused));
+  ASSERT_TRUE(call<SolveState>([&](auto done) { engine().resume(done); }));
+  ASSERT_TRUE(isMeasured());
+  const std::chrono::duration<double> all = std::chrono::steady_clock::now() - begin;
+  EXPECT_LE(status().seconds, all.count() - kPaused);
 }
 
 // A scene that is there already gets the texels that are wanted from then on, and only as long as they are.

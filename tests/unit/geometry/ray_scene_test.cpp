@@ -228,6 +228,29 @@ TEST(RayScene, CopiesAreMetOneAfterTheOther) {
   EXPECT_GT(met, 500U);
 }
 
+/// Each ray of a packet passes by another copy of its own.
+TEST(RayScene, InPacketsCopiesAreMetAsByRaysAlone) {
+  constexpr std::uint32_t kCount = 60, kCopies = 5;
+  const auto all = sceneOf(copiedSoup(kCount, kCopies, 3));
+  std::vector<Ray> rays = raysThrough(64 * kPacket, 5);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const auto met = all.nearest(rays[i]);
+    if (met.found()) rays[i].own = met.triangle + static_cast<std::uint32_t>(i % kCopies) * kCount;
+  }
+  std::size_t found = 0;
+  for (std::size_t first = 0; first < rays.size(); first += kPacket) {
+    std::array<Hit, kPacket> hits;
+    all.nearest(std::span(rays).subspan(first, kPacket), hits);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const auto alone = all.nearest(rays[first + i]);
+      EXPECT_EQ(hits[i].triangle, alone.triangle);
+      EXPECT_EQ(hits[i].front, alone.front);
+      found += alone.found() ? 1 : 0;
+    }
+  }
+  EXPECT_GT(found, 64U);
+}
+
 /// One copy of all lets nothing pass where its key says so.
 class OneOpaqueCopy final : public SeeThrough {
  public:

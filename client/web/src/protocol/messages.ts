@@ -55,6 +55,8 @@ export interface Progress {
     /** What people see, once it is measured: RMS at the surface, and what 95 % of places are off by less than. */
     surface?: number;
     p95?: number;
+    /** They are on their way. */
+    measuring?: boolean;
   };
   energy: Record<string, number>;
   patches: number;

@@ -181,7 +181,7 @@ class BurialRecords : public testing::Test {
   }
 
   Scene scene_;
-  ChartOptions options_{.texel_budget = 6000, .sky = {}, .detail = {}};
+  ChartOptions options_{.texel_budget = 6000, .sky = {}};
   std::mt19937 random_{7};
   std::uint32_t next_node_ = 100;
 };

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <random>
 
+#include "server/scene/compression/draco_mesh.h"
 #include "server/scene/document/document.h"
 #include "tests/unit/scene/compressed_meshes.h"
 #include "tests/unit/scene/expect_refused.h"
@@ -74,10 +75,7 @@ TEST(Draco, leavesADocumentWithoutTheExtensionWhoseIndicesMeanWhatTheyMeant) {
   EXPECT_EQ(gltf["accessors"].size(), before["accessors"].size());
   EXPECT_EQ(gltf["bufferViews"].size(), 4U) << "each has data that is used";
   ASSERT_EQ(document->buffers.size(), 1U) << "the stream is gone";
-  const auto again = parseDocument("again.glb", *writeGlb(*document));
-  ASSERT_TRUE(again) << again.error().text();
-  EXPECT_EQ(again->gltf["meshes"], gltf["meshes"]);
-  EXPECT_EQ(*again->buffers[0], *document->buffers[0]);
+  test::expectSavedAndReadAsItIs(*document);
 }
 
 TEST(Draco, boundsAreThoseOfTheRoundedNumbers) {
@@ -284,8 +282,36 @@ TEST(Draco, aStreamThatClaimsBillionsIsRefusedBeforeTheyAreMade) {
     expectRefused(builder, ErrorCode::kTooLarge, extension, "claims 1342177279 triangles");
     builder.gltf["meshes"][0]["primitives"][0]["indices"] = 3;
     builder.gltf["accessors"][3]["count"] = 1'342'177'278;
-    expectRefused(builder, ErrorCode::kTooLarge, extension, "once it is decoded");
+    expectRefused(builder, ErrorCode::kTooLarge, extension, "once geometry is decoded");
   }
+}
+
+// Each attribute that has seams gets tables of all faces at once: the count of them is one byte.
+TEST(Draco, tablesOfSeamsCountAgainstTheLimits) {
+  const Grid grid(4);
+  const std::string extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
+  auto stream = dracoStream(grid);
+  constexpr std::size_t kSeams = 11 + 3;  // behind the header, the way of traversal, vertices and faces
+  const ImportLimits limits{.max_scene_bytes = 200'000};
+  EXPECT_TRUE(dracoDocument(grid, stream).scene(limits));
+  ASSERT_LT(stream[kSeams], 4);
+  stream[kSeams] = 255;
+  expectRefused(dracoDocument(grid, stream), ErrorCode::kTooLarge, extension, "seams of 255 attributes", limits);
+}
+
+// A stream that many primitives name by other accessors is decoded again for each, with all that nobody asks for.
+TEST(Draco, whatIsDecodedAgainAndAgainCountsAgainstTheLimits) {
+  const Grid grid(30);
+  const auto stream = dracoStream(grid);
+  std::vector<DracoAttribute> none;
+  DracoRequest request{std::move(none), grid.points(), grid.indices.size() / 3, 1U << 30U, 1U << 30U, "here"};
+  const auto mesh = decodeDraco(stream, request);
+  ASSERT_TRUE(mesh) << mesh.error().text();
+  EXPECT_GE(mesh->attribute_bytes, grid.points() * (3 * 4 + 2 * 4 + 2));
+  request.attribute_room = mesh->attribute_bytes - 1;
+  const auto refused = decodeDraco(stream, request);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
 }
 
 TEST(Draco, decodedSizeCountsAgainstTheLimits) {
@@ -294,7 +320,7 @@ TEST(Draco, decodedSizeCountsAgainstTheLimits) {
   const std::string extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression";
   ImportLimits limits;
   limits.max_file_bytes = 200'000;  // the file has some 30,000
-  expectRefused(builder, ErrorCode::kTooLarge, extension, "more than 200000 bytes once it is decoded", limits);
+  expectRefused(builder, ErrorCode::kTooLarge, extension, "more than 200000 bytes once geometry is decoded", limits);
   limits = {.max_scene_bytes = 1'000'000};
   expectRefused(builder, ErrorCode::kTooLarge, extension, "--max-scene-memory", limits);
 }

@@ -1,6 +1,7 @@
 #include "server/scene/document/png.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cstdint>
 #include <vector>
@@ -75,6 +76,33 @@ TEST(Images, AScanTooManyIsRefused) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
   EXPECT_EQ(decodeImage(jpegOf(257), 1U << 20U, "test").error().code, ErrorCode::kTooLarge);
+}
+
+TEST(Images, WhatLiesBehindAJpegIsNoScan) {
+  Bytes jpeg = {0xFF, 0xD8, 0xFF, 0xC2, 0, 11, 8, 0, 64, 0, 64, 1, 1, 0x11, 0, 0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0};
+  jpeg.insert(jpeg.end(), {0x7F, 0xFF, 0xD9});  // its end, and then a film
+  for (int i = 0; i < 1000; ++i) jpeg.insert(jpeg.end(), {0xFF, 0xDA, 0, 8});
+  EXPECT_TRUE(sizeOfImage(jpeg, 1U << 20U, "test"));
+}
+
+/// A picture of one pixel with a hundred megabytes of nothing.
+TEST(Images, ADecoderIsNotAskedForMoreThanThePixelsTake) {
+  auto png = encodePng(1, 1, 3, std::vector<std::uint8_t>{1, 2, 3});
+  EXPECT_TRUE(decodeImage(png, 1U << 20U, "test"));
+  const std::vector<std::uint8_t> nothing(std::size_t{100} << 20U, 0);
+  uLongf size = compressBound(nothing.size());
+  Bytes bomb(8 + size);
+  ASSERT_EQ(compress(bomb.data() + 8, &size, nothing.data(), nothing.size()), Z_OK);
+  bomb.resize(8 + size);
+  for (int i = 0; i < 4; ++i) bomb[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(size >> (24 - 8 * i));
+  for (std::size_t i = 0; i < 4; ++i) bomb[4 + i] = static_cast<std::uint8_t>("IDAT"[i]);
+  bomb.insert(bomb.end(), 4, 0);         // no decoder of ours looks at the sum
+  constexpr std::size_t kHead = 8 + 25;  // signature and IHDR
+  png.resize(kHead);
+  png.insert(png.end(), bomb.begin(), bomb.end());
+  const auto refused = decodeImage(png, 1U << 20U, "test");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge) << refused.error().text();
 }
 
 TEST(Images, PixelsOfSixteenBitsCountTwice) {

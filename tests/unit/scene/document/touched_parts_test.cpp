@@ -6,19 +6,24 @@
 
 #include "server/scene/document/document.h"
 #include "server/scene/document/document_defaults.h"
+#include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
 namespace {
 
-/// Four squares, a light, and materials with and without extensions.
+/// Three squares, a light, and materials with and without extensions.
 Document someDocument() {
-  auto gltf = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2,3]}],
-    "extensionsUsed":["KHR_lights_punctual"],
+  test::GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.gltf.merge_patch(R"({"scene":0,"extensionsUsed":["KHR_lights_punctual"],
     "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":5}]}},
-    "nodes":[{"name":"a"},{"name":"b","translation":[1,0,0]},{"extensions":{"KHR_lights_punctual":{"light":0}}},{}],
-    "materials":[{"name":"m"},{"extensions":{"KHR_materials_clearcoat":{}}},{"name":"n"}]})"_json;
-  materialiseDefaults(gltf);
-  return {"test.glb", std::move(gltf), {}, {}};
+    "materials":[{"name":"m"},{"extensions":{"KHR_materials_clearcoat":{}}},{"name":"n"}]})"_json);
+  builder.node({{"name", "a"}, {"mesh", mesh}});
+  builder.node({{"name", "b"}, {"mesh", mesh}, {"translation", {1, 0, 0}}});
+  builder.node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  builder.node({{"mesh", mesh}, {"translation", {0, 2, 0}}});
+  builder.gltf["scenes"] = {{{"nodes", {0, 1, 2, 3}}}};
+  return builder.document().value();
 }
 
 constexpr std::array kFew = {
@@ -54,7 +59,11 @@ void expectOutcome(const char* text, bool all) {
   const auto wholly = importEdited(edited->document, nullptr).value();
   EXPECT_EQ(edited->scene.warnings, wholly.scene.warnings) << text;
   EXPECT_EQ(edited->scene.materials, wholly.scene.materials) << text;
+  ASSERT_FALSE(edited->scene.instances.empty());
+  ASSERT_FALSE(edited->scene.lights.empty());
   EXPECT_EQ(edited->scene.instances, wholly.scene.instances) << text;
+  EXPECT_EQ(edited->scene.lights, wholly.scene.lights) << text;
+  EXPECT_EQ(edited->scene.primitives.size(), wholly.scene.primitives.size()) << text;
   auto forth = document.gltf, back = after;
   forth.patch_inplace(diffDocuments(document.gltf, after, edited->parts));
   EXPECT_EQ(forth, after) << text;

@@ -65,6 +65,23 @@ class SurfaceErrorTest : public testing::Test {
 class SurfaceErrorUnderAPlate : public SurfaceErrorTest {
  protected:
   SurfaceErrorUnderAPlate() : SurfaceErrorTest(true) {}
+
+  /// Of the lamp, by what it brings there: an integral over it.
+  [[nodiscard]] static double openPart(const glm::dvec3& from) {
+    constexpr int kGrid = 300;
+    double open = 0.0, all = 0.0;
+    for (int i = 0; i < kGrid; ++i) {
+      for (int k = 0; k < kGrid; ++k) {
+        const glm::dvec3 point(-0.1 + 0.2 * (i + 0.5) / kGrid, 0.4, -0.1 + 0.2 * (k + 0.5) / kGrid);
+        const auto way = point - from;
+        const double square = glm::dot(way, way), weight = way.y * way.y / (square * square);
+        const auto at = from + way * (-from.y / way.y);
+        all += weight;
+        if (std::abs(at.x) > 0.1 || std::abs(at.z) > 0.1) open += weight;
+      }
+    }
+    return open / all;
+  }
 };
 
 TEST_F(SurfaceErrorTest, APlaceThatSeesAllOfALampHasTheLightOfLambertsFormula) {
@@ -105,30 +122,25 @@ TEST_F(SurfaceErrorUnderAPlate, UnderItThereIsNoLight) {
   EXPECT_EQ(places.arriving(places.spotOn(8 * 16 + 8, {0.5F, 0.5F}), 3).x, 0.0);
 }
 
-// A lamp that is half hidden is seen by points of it: two estimates differ, and their mean is near the part that is
-// open, of 32 points each to some 3 %.
+// A lamp that is hidden in part is seen by points of it: the mean of many estimates is the part that is open, near the
+// edges of the penumbra too, where most first looks agree. 4096 of some 30 points each tell it to half a percent.
 TEST_F(SurfaceErrorUnderAPlate, InPenumbraThePartThatIsOpenCounts) {
   const auto places = light();
-  const auto spot = places.spotOn(8 * 16 + 4, {0.5F, 0.5F});
-  const auto far = spot.place.position;  // from there the plate hides what lies beyond a line across the lamp
-  double mean = 0.0;
-  for (std::uint64_t key = 0; key < 64; ++key) mean += places.arriving(spot, key).x / 64.0;
-  // By integration over the lamp.
-  constexpr int kGrid = 200;
-  double open = 0.0, all = 0.0;
-  for (int i = 0; i < kGrid; ++i) {
-    for (int k = 0; k < kGrid; ++k) {
-      const glm::dvec3 point(-0.1 + 0.2 * (i + 0.5) / kGrid, 0.4, -0.1 + 0.2 * (k + 0.5) / kGrid);
-      const auto way = point - far;
-      const double square = glm::dot(way, way), weight = way.y * way.y / (square * square);
-      const auto at = far + way * ((0.0 - far.y) / way.y);
-      all += weight;
-      if (std::abs(at.x) > 0.1 || std::abs(at.z) > 0.1) open += weight;
-    }
+  std::size_t nearly_open = 0, nearly_hidden = 0;
+  for (int i = 0; i < 18; ++i) {
+    const auto spot = places.spotOn(8 * 16 + 2 + static_cast<std::uint32_t>(i / 3), {0.1F + 0.4F * (i % 3), 0.5F});
+    const auto from = spot.place.position;
+    double mean = 0.0;
+    constexpr std::uint64_t kKeys = 4096;
+    for (std::uint64_t key = 0; key < kKeys; ++key)
+      mean += places.arriving(spot, key * 7919).x / static_cast<double>(kKeys);
+    const double part = openPart(from);
+    nearly_open += part > 0.8 && part < 1.0 ? 1 : 0;
+    nearly_hidden += part > 0.0 && part < 0.2 ? 1 : 0;
+    EXPECT_NEAR(mean, litAt(from) * part, 0.005 * litAt(from)) << i << ", open: " << part;
   }
-  EXPECT_GT(open, 0.2 * all);
-  EXPECT_LT(open, 0.8 * all);
-  EXPECT_NEAR(mean, litAt(far) * open / all, 0.01 * litAt(far));
+  EXPECT_GT(nearly_open, 0U);
+  EXPECT_GT(nearly_hidden, 0U);
 }
 
 // A leak into the dark is no small thing beside nothing.

@@ -70,6 +70,16 @@ TEST_F(TexelDetailTest, NoMoreThanThereMayBe) {
   EXPECT_GT(chosen.error, 0.001);
 }
 
+// Texels that are as fine as any may be promise nothing, and such as coarse as any may be save nothing.
+TEST_F(TexelDetailTest, WhatIsAtItsEndStaysThere) {
+  scene_.patches->surfaces[0].detail = 0.5F;
+  scene_.patches->surfaces[2].detail = 64.0F;
+  const auto chosen = choose({0.001, 1e9});
+  EXPECT_EQ(chosen.of_surface[0], 0.5F);
+  EXPECT_EQ(chosen.of_surface[2], 64.0F);
+  EXPECT_GT(chosen.error, 0.01);
+}
+
 TEST_F(TexelDetailTest, MoreThatIsMeasuredAsksForMore) {
   EXPECT_GT(choose({0.02, 1e6}, 4.0).texels, choose({0.02, 1e6}).texels);
 }

@@ -1,0 +1,36 @@
+// Where the program chooses texels: how many it begins with, how well light is to be known on them, and what others
+// there should be. Pure functions of values; solve thread, but for texelBudget().
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "server/engine/engine.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/solver.h"
+#include "server/solver/surface/surface_error.h"
+
+namespace radiosity::engine {
+
+/// LitScene::setDraft() of texels alike, which others are to replace.
+inline constexpr double kPilotDraft = 0.06;
+
+/// That a scene is laid out with first. Any thread.
+[[nodiscard]] std::uint64_t texelBudget(const SolveSettings& settings);
+
+/// What is stated at the surface is of both, the solver's error and that of texels: the solver's part. `draft_error`:
+/// that texels leave which are to be replaced; 0: they are to stay.
+[[nodiscard]] double solverTarget(const SolveSettings& settings, double draft_error);
+
+struct WantedTexels {
+  scene::TexelLayout layout;
+  double error = 0.0;   ///< that is likely to be left by them alone
+  double texels = 0.0;  ///< in all
+};
+/// For the target, about; `patch_count`: that there are. Cost: some passes over the leaves.
+[[nodiscard]] WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver& solver,
+                                        std::span<const solver::SurfaceError::Measured> measured,
+                                        const SolveSettings& settings, std::uint64_t patch_count);
+
+}  // namespace radiosity::engine
