@@ -3,7 +3,7 @@
 
 import type { Page, Route } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { alive, countAlive, grown } from './card';
+import { countAlive, grown, mayLive } from './card';
 import { converged, difference, drawn, pixels, said, sceneOf, SCENES, serveEach, squares, until } from './harness';
 
 const { pages, serve } = serveEach();
@@ -55,7 +55,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
   await page.goto(server.url);
   await converged(page);
   await drawn(page);
-  const before = await alive(page);
+  const before = await mayLive(page);
 
   // While it is on the line: what is not wanted any more does not go on being loaded.
   const given: string[] = [];
