@@ -28,4 +28,14 @@ inline constexpr const char* kMethodNamesText = "gather, shooting, paper";
   return std::nullopt;
 }
 
+/// Whether the program chooses the sizes of texels: not where one size was asked for, nor in paper mode, which has
+/// patches alike.
+[[nodiscard]] constexpr bool choosesTexels(bool adaptive, double texel_size_m, Method method) {
+  return adaptive && texel_size_m <= 0.0 && method != Method::kPaper;
+}
+
+/// Texels of a scene unless another number is named: all alike, and the most where the program chooses them.
+inline constexpr std::uint64_t kTexels = 24'000, kMostTexels = 1'000'000;
+[[nodiscard]] constexpr std::uint64_t usualTexels(bool chosen) { return chosen ? kMostTexels : kTexels; }
+
 }  // namespace radiosity

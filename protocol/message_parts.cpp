@@ -75,6 +75,7 @@ json toJson(const Progress& p) {
               {"seconds", p.seconds},
               {"error",
                {{"total", p.error.total},
+                {"texels", p.error.texels},
                 {"residual", p.error.residual},
                 {"sampling", p.error.sampling},
                 {"variation", p.error.variation},
@@ -90,7 +91,6 @@ json toJson(const Progress& p) {
               {"nodes", p.nodes},
               {"surfaces", p.surfaces},
               {"polygons", p.polygons}};
-  if (p.error.surface) out["error"]["surface"] = *p.error.surface;
   if (p.error.p95) out["error"]["p95"] = *p.error.p95;
   if (p.error.measuring) out["error"]["measuring"] = true;
   if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
@@ -111,11 +111,11 @@ void read(Reader& r, Progress& p) {
   r.optionalNumber("secondsLeft", p.seconds_left, {});
   r.object("error", Need::kRequired, [&](Reader& e) {
     e.number("total", p.error.total, Need::kRequired, {});
+    e.number("texels", p.error.texels, Need::kRequired, {});
     e.number("residual", p.error.residual, Need::kRequired, {});
     e.number("sampling", p.error.sampling, Need::kRequired, {});
     e.number("variation", p.error.variation, Need::kOptional, {});
     e.number("discretization", p.error.discretization, Need::kRequired, {});
-    e.optionalNumber("surface", p.error.surface, {});
     e.optionalNumber("p95", p.error.p95, {});
     e.boolean("measuring", p.error.measuring, Need::kOptional);
   });

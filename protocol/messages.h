@@ -47,10 +47,13 @@ enum class Quantity : std::uint8_t {
 // ---- parts ----
 
 struct ErrorParts {
-  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
-  /// Measured where people look, and what 95 % of places are off by less than; nothing: not measured, yet.
-  std::optional<double> surface = std::nullopt, p95 = std::nullopt;
-  bool measuring = false;  ///< they are on their way
+  double total = 1.0;   ///< at the surface, where people look
+  double texels = 1.0;  ///< of texels alone; the next three are its parts
+  double residual = 1.0, sampling = 0.0, variation = 0.0;
+  double discretization = 0.0;
+  /// What 95 % of places are off by less than; nothing: it is not measured yet, and `total` is an estimate.
+  std::optional<double> p95 = std::nullopt;
+  bool measuring = false;  ///< it is on its way
 };
 
 struct EnergyParts {
@@ -61,13 +64,15 @@ struct EnergyParts {
 struct Settings {
   double target_error = 0.02;
   std::optional<std::uint64_t> time_limit_ms;  ///< none: no limit (JSON null)
-  std::uint64_t texels = 24'000;               ///< used when texel_size_m is 0
+  std::uint64_t texels = kTexels;              ///< used when texel_size_m is 0; where they are chosen, the most
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<Sky> sky;  ///< none: JSON null
   bool double_sided = false;
   bool adaptive = false;
   Method method = Method::kGather;
+
+  [[nodiscard]] bool choosesTexels() const { return radiosity::choosesTexels(adaptive, texel_size_m, method); }
 };
 
 struct PageInfo {
@@ -148,7 +153,7 @@ struct SceneHistoryReply {
 /// Errors as in ErrorParts, at so many seconds of solve time.
 struct ErrorSample {
   double seconds = 0.0;
-  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0;
+  double total = 1.0, texels = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0;
 };
 struct SolveHistoryReply {
   std::uint64_t revision = 0;

@@ -63,6 +63,7 @@ void read(Reader& r, PastRevision& past) {
 void read(Reader& r, ErrorSample& sample) {
   r.number("seconds", sample.seconds, Need::kRequired, {});
   r.number("total", sample.total, Need::kRequired, {});
+  r.number("texels", sample.texels, Need::kRequired, {});
   r.number("residual", sample.residual, Need::kRequired, {});
   r.number("sampling", sample.sampling, Need::kRequired, {});
   r.number("variation", sample.variation, Need::kRequired, {});
@@ -176,6 +177,7 @@ std::string encodeReply(const RequestId& id, const SolveHistoryReply& r) {
   for (const auto& sample : r.samples)
     samples.push_back({{"seconds", sample.seconds},
                        {"total", sample.total},
+                       {"texels", sample.texels},
                        {"residual", sample.residual},
                        {"sampling", sample.sampling},
                        {"variation", sample.variation}});

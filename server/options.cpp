@@ -52,9 +52,10 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--time-limit", raw.time_limit_s, "Stop after this many seconds of solving; 0: no limit")
       ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
-  app.add_option("--texels", o.solve.texels, "Lightmap texels (leaf patches) in all, about")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  app.add_option("--texels", o.solve.texels,
+                 "Lightmap texels (leaf patches) that there may be (1000000 unless named), or, of one size, in all, "
+                 "about (24000)")
+      ->check(CLI::PositiveNumber);
   app.add_option("--texel-size", o.solve.texel_size_m, "Side of a texel in metres; 0: from --texels")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -85,9 +86,10 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_flag(
       "--double-sided", o.solve.double_sided,
       "Light both sides of all surfaces, whatever their materials say: for rooms whose faces are turned outward");
-  app.add_flag("--adaptive", o.solve.adaptive,
-               "Choose texels, as few as meet the target where people look, finer where light wants it: --texels are "
-               "the most there may be");
+  o.solve.adaptive = true;
+  app.add_flag("--uniform{false}", o.solve.adaptive,
+               "Texels of one size everywhere, --texels of them. Without it, and without --texel-size, the server "
+               "chooses them, as few as meet the target where people look, finer where light wants it");
   app.add_option(
          "--link-memory", o.solve.link_memory_bytes,
          "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "
@@ -136,7 +138,7 @@ std::set<std::string> namedSettings(const CLI::App& app) {
   note("--time-limit", "timeLimit");
   note("--texels", "texels");
   note("--texel-size", "texels");
-  note("--adaptive", "adaptive");
+  note("--uniform", "adaptive");
   note("--seed", "seed");
   note("--sky", "sky");
   note("--double-sided", "doubleSided");
@@ -213,6 +215,7 @@ ParsedOptions parseOptions(int argc, const char* const* argv, const std::string&
     return parsed;
   }
   options.named_settings = namedSettings(app);
+  if (app.count("--texels") == 0) options.solve.texels = options.solve.usualTexels();
   if (const auto finished = finish(options, raw); !finished) {
     std::fprintf(stderr, "radiosityd: %s\n", finished.error().text().c_str());
     parsed.exit_code = kExitBadUsage;

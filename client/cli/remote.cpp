@@ -93,7 +93,7 @@ Result<std::vector<client::AtomicFile>> downloadAll(const Remote& remote, const 
 
 /// What UVs and pages that belong together have in common: other texels make another layout of the same revision.
 struct Layout {
-  std::uint64_t revision = 0, texels = 0;
+  std::uint64_t revision = 0, texels = 0, patches = 0;
   double texel_size_m = 0.0;
   bool operator==(const Layout&) const = default;
 };
@@ -106,7 +106,8 @@ Result<Layout> currentLayout(const Remote& remote) {
     const auto status = connection->call(protocol::StatusCall{});
     if (!status) return tl::unexpected(status.error().error);
     if (status->progress.state != "loading")
-      return Layout{status->progress.revision, status->settings.texels, status->settings.texel_size_m};
+      return Layout{status->progress.revision, status->settings.texels, status->progress.patches,
+                    status->settings.texel_size_m};
     if (auto polled = connection->poll(std::chrono::milliseconds(200)); !polled) return tl::unexpected(polled.error());
   }
   return fail(ErrorCode::kUnavailable, "interrupted");

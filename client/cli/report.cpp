@@ -29,6 +29,13 @@ json settingsJson(const protocol::Settings& settings) {
           {"method", nameOf(settings.method)}};
 }
 
+/// A total is that of too wide texels where it is so many times what these are off by.
+constexpr double kWide = 2.0;
+
+std::string p95Text(const protocol::ErrorParts& error) {
+  return error.p95 ? fmt::format(", 95 % of places within {}", percentText(*error.p95)) : std::string();
+}
+
 std::string stateWord(const std::string& state) { return state == "timeLimit" ? "time limit" : state; }
 
 }  // namespace
@@ -43,12 +50,12 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
               {"nodes", progress.nodes},
               {"error",
                {{"total", progress.error.total},
+                {"p95", progress.error.p95 ? json(*progress.error.p95) : json(nullptr)},
+                {"texels", progress.error.texels},
                 {"residual", progress.error.residual},
                 {"sampling", progress.error.sampling},
                 {"variation", progress.error.variation},
                 {"discretization", progress.error.discretization}}},
-              {"surface_error", progress.error.surface ? json(*progress.error.surface) : json(nullptr)},
-              {"surface_p95", progress.error.p95 ? json(*progress.error.p95) : json(nullptr)},
               {"energy",
                {{"emitted", progress.energy.emitted},
                 {"absorbed", progress.energy.absorbed},
@@ -84,11 +91,13 @@ std::string statusText(const protocol::StatusReply& status) {
   const auto loaded = p.fraction ? fmt::format(", {:.0f} % done", 100.0 * *p.fraction) : std::string();
   row("state", stateWord(p.state) + loaded + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
-  row("error", !p.unlit.empty() ? unlitText(p)
-                                : fmt::format("{} of {} (residual {}, sampling {}, variation {}, discretization {})",
-                                              percentText(p.error.total), percentText(s.target_error),
-                                              percentText(p.error.residual), percentText(p.error.sampling),
-                                              percentText(p.error.variation), percentText(p.error.discretization)));
+  row("error",
+      !p.unlit.empty()
+          ? unlitText(p)
+          : fmt::format("{} of {}{} (texels {}: residual {}, sampling {}, variation {}; between them {})",
+                        percentText(p.error.total), percentText(s.target_error), p95Text(p.error),
+                        percentText(p.error.texels), percentText(p.error.residual), percentText(p.error.sampling),
+                        percentText(p.error.variation), percentText(p.error.discretization)));
   row("shots", fmt::format("{}, {:.0f}/s", countText(p.shots), p.shots_per_second));
   row("time", durationText(p.seconds) + (p.seconds_left ? ", " + durationText(*p.seconds_left) + " left" : "") +
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
@@ -98,7 +107,9 @@ std::string statusText(const protocol::StatusReply& status) {
                             "imbalance {:.3g}",
                             p.energy.emitted, p.energy.absorbed, p.energy.escaped, p.energy.backface, p.energy.unshot,
                             p.energy.imbalance));
-  row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m) : "about " + countText(s.texels));
+  row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m)
+                                     : (s.choosesTexels() ? "as light wants them, " + countText(s.texels) + " at most"
+                                                          : "about " + countText(s.texels)));
   row("seed", std::to_string(s.seed));
   if (s.double_sided) row("sides", "both of all surfaces");
   if (s.method != Method::kGather) row("method", std::string(nameOf(s.method)));
@@ -135,11 +146,9 @@ std::string outcomeText(const protocol::Progress& progress) {
 }
 
 std::string surfaceText(const protocol::ErrorParts& error) {
-  if (error.surface && error.p95)
-    return fmt::format("; {} at the surface, 95 % of places within {}", percentText(*error.surface),
-                       percentText(*error.p95));
-  if (!(error.discretization > error.total)) return {};
-  return fmt::format("; finer texels would change {}", percentText(error.discretization));
+  auto text = error.p95 ? ";" + p95Text(error).substr(1) : std::string();
+  if (kWide * error.texels < error.total) text += fmt::format("; texels alone are {} off", percentText(error.texels));
+  return text;
 }
 
 }  // namespace radiosity::cli

@@ -34,14 +34,14 @@ struct SolveOptions {
   RemoteOptions server;
   double error = 0.02;
   double time_limit_s = 0.0;  ///< 0: none
-  std::uint64_t texels = 24'000;
+  std::uint64_t texels = 0;   ///< 0: as many as usual
   double texel_size_m = 0.0;  ///< 0: by number
   std::uint64_t seed = 1;
   unsigned workers = 0;          ///< 0: the server's choice
   std::string visibility;        ///< empty: the server's choice
   std::string link_memory;       ///< as radiosityd takes it; empty: the server's choice
   std::string max_scene_memory;  ///< likewise
-  bool double_sided = false, adaptive = false;
+  bool double_sided = false, uniform = false;
   Method method = Method::kGather;
   bool unlit = false, error_map = false, quiet = false;
 };
@@ -140,15 +140,16 @@ class Solve {
   }
 
   [[nodiscard]] protocol::SolveConfigureCall settings() const {
+    const bool chooses = choosesTexels(!options_.uniform, options_.texel_size_m, options_.method);
     protocol::SolveConfigureCall call{.target_error = options_.error,
                                       .no_time_limit = options_.time_limit_s <= 0.0,
-                                      .texels = options_.texels,
+                                      .texels = options_.texels > 0 ? options_.texels : usualTexels(chooses),
                                       .texel_size_m = options_.texel_size_m,
                                       .seed = options_.seed,
                                       .sky = sky_,
                                       .no_sky = !sky_,
                                       .double_sided = options_.double_sided,
-                                      .adaptive = options_.adaptive,
+                                      .adaptive = !options_.uniform,
                                       .method = options_.method};
     constexpr double kMillisecondsPerSecond = 1000.0;
     if (!call.no_time_limit)
@@ -242,16 +243,17 @@ class Solve {
     }
     if (!now || now->progress.revision != status.progress.revision || now->progress.shots != status.progress.shots)
       return;
-    status.progress.error.surface = now->progress.error.surface;
+    status.progress.error.total = now->progress.error.total;
     status.progress.error.p95 = now->progress.error.p95;
   }
 
   ExitCode finish(client::Connection& connection, protocol::StatusReply status) {
+    const bool chooses = status.settings.choosesTexels();
+    const auto& error = status.progress.error;
     const bool reached =
-        status.progress.error.total <= options_.error && (!options_.adaptive || status.progress.state == "converged");
+        (chooses ? error.total : error.texels) <= options_.error && (!chooses || status.progress.state == "converged");
     if (!reached && status.progress.state == "converged")
-      warn(fmt::format("the server stopped at {}: another client changed its settings",
-                       percentText(status.progress.error.total)));
+      warn(fmt::format("the server stopped at {}: another client changed its settings", percentText(error.total)));
     auto written = saveScene(remote_,
                              {.glb_path = options_.output,
                               .unlit = options_.unlit,
@@ -345,22 +347,19 @@ void addSolve(CLI::App& app, Run& run) {
       .add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
       ->check(CLI::Range(0.001, 1e6).description(""))
       ->type_name("SECONDS");
-  auto* texels = command.add_option("--texels", options->texels, "lightmap texels (leaf patches) in all, about")
+  auto* texels = command
+                     .add_option("--texels", options->texels,
+                                 "lightmap texels (leaf patches) that there may be (default: 1000000), or, of one "
+                                 "size, in all, about (24000)")
                      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U).description(""))
-                     ->type_name("COUNT")
-                     ->capture_default_str();
+                     ->type_name("COUNT");
   command.add_option("--texel-size", options->texel_size_m, "side of a texel in metres, instead of --texels")
       ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("METRES")
       ->excludes(texels);
-  auto* adaptive = command.add_flag("--adaptive", options->adaptive,
-                                    "choose texels, as few as meet --error where people look, finer where light wants "
-                                    "it; --texels are the most there may be (then 1000000 unless it is named)");
-  adaptive->excludes("--texel-size");
-  command.parse_complete_callback([options, texels] {
-    constexpr std::uint64_t kMostTexels = 1'000'000;
-    if (options->adaptive && texels->count() == 0) options->texels = kMostTexels;
-  });
+  command.add_flag("--uniform", options->uniform,
+                   "texels of one size everywhere, on which --error is met; without it, and without --texel-size, "
+                   "texels are chosen, as few as meet --error where people look, finer where light wants it");
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
       ->type_name("N")
       ->capture_default_str();

@@ -27,13 +27,20 @@ namespace radiosity::engine {
 /// edit.
 enum class SolveState { kEmpty, kLoading, kSolving, kPaused, kConverged, kTimeLimit, kLimited, kFailed };
 
-/// Relative RMS errors of irradiance over all texels, area-weighted; estimates. total^2 = sum of squares.
+/// Relative RMS errors of irradiance; estimates.
 struct ErrorEstimate {
-  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
+  /// What people see: how far bilinear lookups at random places of surfaces are off. Measured once light is solved for
+  /// (Status::surface_error); until then `texels` and `discretization` together, or less where better light is shown
+  /// meanwhile.
+  double total = 1.0;
+  /// Of texels alone, area-weighted: texels^2 = residual^2 + sampling^2 + variation^2.
+  double texels = 1.0;
+  double residual = 1.0, sampling = 0.0, variation = 0.0;
+  double discretization = 0.0;  ///< between texels, by how they differ from their parents
 };
 
-/// What people see of it: how far bilinear lookups in lightmaps are off at random places of surfaces, measured there by
-/// rays once light is solved for. Relative to the RMS of irradiance.
+/// What people see of it, measured by rays at random places of surfaces once light is solved for. Relative to the RMS
+/// of irradiance.
 struct SurfaceEstimate {
   double total = 0.0;      ///< RMS over places
   double deviation = 0.0;  ///< standard deviation of that
@@ -86,7 +93,7 @@ struct SkySetting {
 struct SolveSettings {
   double target_error = 0.02;          ///< relative; stops when the estimate reaches it
   std::optional<double> time_limit_s;  ///< solve time
-  std::uint64_t texels = 24'000;       ///< leaf patches in all, about; used when texel_size_m is 0
+  std::uint64_t texels = kTexels;      ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
   /// `texels` are the most there may be: as few are made, finer where light wants it, as meet the target at the
   /// surface.
@@ -98,7 +105,8 @@ struct SolveSettings {
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 
   bool operator==(const SolveSettings&) const = default;
-  [[nodiscard]] bool choosesTexels() const { return adaptive && texel_size_m <= 0.0 && method != Method::kPaper; }
+  [[nodiscard]] bool choosesTexels() const { return radiosity::choosesTexels(adaptive, texel_size_m, method); }
+  [[nodiscard]] std::uint64_t usualTexels() const { return radiosity::usualTexels(choosesTexels()); }
 };
 
 /// Warnings that a Status holds at most: it is made ten times a second, and scenes have as many as they have materials.

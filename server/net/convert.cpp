@@ -11,8 +11,8 @@ namespace {
 double finite(double value, double otherwise) { return std::isfinite(value) ? value : otherwise; }
 
 protocol::ErrorParts toErrorParts(const engine::ErrorEstimate& error) {
-  return {finite(error.total, 1e9), finite(error.residual, 1e9), finite(error.sampling, 1e9),
-          finite(error.variation, 1e9), finite(error.discretization, 1e9)};
+  return {finite(error.total, 1e9),    finite(error.texels, 1e9),    finite(error.residual, 1e9),
+          finite(error.sampling, 1e9), finite(error.variation, 1e9), finite(error.discretization, 1e9)};
 }
 
 }  // namespace
@@ -56,10 +56,7 @@ protocol::Progress toProgress(const engine::Status& s) {
   if (s.seconds_left && std::isfinite(*s.seconds_left)) p.seconds_left = std::max(0.0, *s.seconds_left);
   p.error = toErrorParts(s.error);
   p.error.measuring = s.probes_surface;
-  if (s.surface_error) {
-    p.error.surface = finite(s.surface_error->total, 1e9);
-    p.error.p95 = finite(s.surface_error->p95, 1e9);
-  }
+  if (s.surface_error) p.error.p95 = finite(s.surface_error->p95, 1e9);
   p.energy = {finite(s.energy.emitted, 0.0),  finite(s.energy.absorbed, 0.0), finite(s.energy.escaped, 0.0),
               finite(s.energy.backface, 0.0), finite(s.energy.unshot, 0.0),   finite(s.energy.imbalance, 0.0)};
   p.patches = s.patches;
@@ -98,6 +95,7 @@ protocol::Settings toSettings(const engine::SolveSettings& s) {
 }
 
 engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfigureCall& call) {
+  const bool usual = s.texels == s.usualTexels();
   if (call.target_error) s.target_error = *call.target_error;
   if (call.no_time_limit) s.time_limit_s.reset();
   if (call.time_limit_ms) s.time_limit_s = static_cast<double>(*call.time_limit_ms) / 1000.0;
@@ -112,6 +110,8 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   if (call.double_sided) s.double_sided = *call.double_sided;
   if (call.adaptive) s.adaptive = *call.adaptive;
   if (call.method) s.method = *call.method;
+  // A million texels alike would take the paper's method hours.
+  if (usual && !call.texels) s.texels = s.usualTexels();
   return s;
 }
 
@@ -168,7 +168,7 @@ protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& hist
   for (const auto& sample : history.samples) {
     const auto error = toErrorParts(sample.error);
     reply.samples.push_back(
-        {finite(sample.seconds, 0.0), error.total, error.residual, error.sampling, error.variation});
+        {finite(sample.seconds, 0.0), error.total, error.texels, error.residual, error.sampling, error.variation});
   }
   return reply;
 }

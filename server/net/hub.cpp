@@ -223,9 +223,11 @@ std::optional<bool> Hub::reached(const Waiter& waiter, const engine::Status& sta
   if (status.revision < waiter.revision || status.state == engine::SolveState::kLoading) return std::nullopt;
   const double wanted = waiter.error.value_or(status.settings.target_error);
   const bool solved = status.state != engine::SolveState::kEmpty && status.state != engine::SolveState::kFailed;
-  // Where the program chooses texels it ends as converged where people see no more than was asked for.
-  const bool by_end = !waiter.error && status.settings.choosesTexels();
-  if (!by_end && solved && status.error.total <= wanted) return true;
+  // Where the program chooses texels what was asked for is what people see, which is measured.
+  const bool chooses = status.settings.choosesTexels();
+  const bool good =
+      chooses ? waiter.error && status.surface_error && status.error.total <= wanted : status.error.texels <= wanted;
+  if (solved && good) return true;
   if (hasStopped(status.state)) return solved && !waiter.error && status.state == engine::SolveState::kConverged;
   return std::nullopt;
 }

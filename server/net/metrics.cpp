@@ -59,14 +59,12 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.gauge("solve_seconds", "Solve time, without start-up and loading.", status.seconds);
   text.family("error_ratio", "gauge", "Estimated relative RMS error of irradiance.");
   text.sample("error_ratio", status.error.total, "{part=\"total\"}");
+  text.sample("error_ratio", status.error.texels, "{part=\"texels\"}");
   text.sample("error_ratio", status.error.residual, "{part=\"residual\"}");
   text.sample("error_ratio", status.error.sampling, "{part=\"sampling\"}");
   text.sample("error_ratio", status.error.variation, "{part=\"variation\"}");
   text.sample("error_ratio", status.error.discretization, "{part=\"discretization\"}");
-  if (status.surface_error) {
-    text.sample("error_ratio", status.surface_error->total, "{part=\"surface\"}");
-    text.sample("error_ratio", status.surface_error->p95, "{part=\"p95\"}");
-  }
+  if (status.surface_error) text.sample("error_ratio", status.surface_error->p95, "{part=\"p95\"}");
   text.family("energy_lumens", "gauge", "Where the light went.");
   text.sample("energy_lumens", status.energy.emitted, "{part=\"emitted\"}");
   text.sample("energy_lumens", status.energy.absorbed, "{part=\"absorbed\"}");

@@ -45,7 +45,7 @@ std::string lastLine(const std::filesystem::path& file) {
 }  // namespace
 
 SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::path& scene,
-                  const std::filesystem::path& folder, const std::vector<std::string>& arguments) {
+                  const std::filesystem::path& folder, const std::vector<std::string>& arguments, bool chosen) {
   std::filesystem::create_directories(folder);
   SolveRun run;
   run.output = folder / (scene.stem().string() + "-lit.glb");
@@ -54,6 +54,7 @@ SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::pa
   std::vector<std::string> words{client.string(),     "solve",    scene.string(),  "-o",
                                  run.output.string(), "--report", report.string(), "-q"};
   words.insert(words.end(), arguments.begin(), arguments.end());
+  if (!chosen) words.emplace_back("--uniform");
   const auto log = folder / (scene.stem().string() + "-solve.log");
   const auto start = std::chrono::steady_clock::now();
   const pid_t process = spawnInto(log, std::move(words));

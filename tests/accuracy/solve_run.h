@@ -19,9 +19,11 @@ struct SolveRun {
 };
 
 /// `client` is the radiosity program (or a name in PATH); `arguments` come after those for files. Output and report go
-/// to `folder`, which is made. Throws std::runtime_error when the program cannot be started.
+/// to `folder`, which is made. Texels are of one size (--uniform) unless `chosen`. Throws std::runtime_error when the
+/// program cannot be started.
 [[nodiscard]] SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::path& scene,
-                                const std::filesystem::path& folder, const std::vector<std::string>& arguments);
+                                const std::filesystem::path& folder, const std::vector<std::string>& arguments,
+                                bool chosen = false);
 
 /// Lights a scene as `radiosity solve --sky OPTION` had it; as there, a sky of the scene's own comes first. Throws
 /// std::invalid_argument for an option that is none.

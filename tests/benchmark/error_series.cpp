@@ -43,7 +43,7 @@ struct Judge {
 
 StatedError statedOf(const json& report) {
   const auto error = report.value("error", json::object());
-  return {error.value("total", 0.0), error.value("residual", 0.0), error.value("sampling", 0.0),
+  return {error.value("texels", 0.0), error.value("residual", 0.0), error.value("sampling", 0.0),
           error.value("variation", 0.0), error.value("discretization", 0.0)};
 }
 
@@ -76,7 +76,8 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   std::vector<std::string> arguments{"--time-limit", fmt::format("{:g}", time), "--error", fmt::format("{:g}", error)};
   arguments.insert(arguments.end(), options.solve_arguments.begin(), options.solve_arguments.end());
   if (!series.sky.empty()) arguments.insert(arguments.end(), {"--sky", series.sky});
-  const auto run = accuracy::runSolve(options.client, scene, options.work_folder / series.name, arguments);
+  const auto run =
+      accuracy::runSolve(options.client, scene, options.work_folder / series.name, arguments, options.chosen_texels);
   row.exit_code = run.exit_code;
   row.wall_seconds = run.wall_seconds;
   if (run.exit_code != kReached && run.exit_code != kTimeLimit) {

@@ -18,7 +18,8 @@ struct SeriesOptions {
   double floor = 0.002;                                       ///< stated error at which longer runs add nothing
   std::string client = "radiosity";
   std::vector<std::string> solve_arguments;
-  std::string sky = "1000";  ///< of scenes in which nothing shines, as `radiosity solve --sky` takes it
+  bool chosen_texels = false;  ///< by the program, as many as the error asks for; else of one size
+  std::string sky = "1000";    ///< of scenes in which nothing shines, as `radiosity solve --sky` takes it
   accuracy::ReferenceOptions reference;
   std::filesystem::path reference_folder, work_folder;
 

@@ -74,10 +74,11 @@ std::vector<fs::path> chosenScenes(const Options& options) {
 }
 
 /// The rooms of the paper have its numbers of patches (Lum, Ma and Max 2002, section 5); other scenes the default.
-std::vector<std::string> argumentsFor(const fs::path& scene, const std::vector<std::string>& asked) {
+std::vector<std::string> argumentsFor(const fs::path& scene, const benchmark::SeriesOptions& options) {
+  const auto& asked = options.solve_arguments;
   const bool chosen = std::any_of(asked.begin(), asked.end(), [](const auto& a) { return a.rfind("--texel", 0) == 0; });
   auto arguments = asked;
-  if (chosen || scene.parent_path() != kBuiltIn) return arguments;
+  if (chosen || options.chosen_texels || scene.parent_path() != kBuiltIn) return arguments;
   const auto name = scene.stem().string();
   if (name.rfind("room_small", 0) == 0) arguments.insert(arguments.end(), {"--texels", "13742"});
   if (name.rfind("room_seminar", 0) == 0) arguments.insert(arguments.end(), {"--texels", "27382"});
@@ -128,7 +129,7 @@ void runAll(Options options) {
   std::vector<benchmark::SceneSeries> done;
   for (const auto& scene : chosenScenes(options)) {
     auto series = options.series;
-    series.solve_arguments = argumentsFor(scene, options.series.solve_arguments);
+    series.solve_arguments = argumentsFor(scene, options.series);
     done.push_back(benchmark::measureScene(scene, series));
     write(options, description, done);  // after each, so that an interrupted run has something to show
   }
@@ -173,6 +174,7 @@ int main(int argc, char** argv) {
   app.add_option("--texels", series.reference.texels, "texels compared, 0: all; quick: 2000")->capture_default_str();
   app.add_option("--points", series.reference.points, "surface points compared; quick: 1000")->capture_default_str();
   app.add_option("--solve-argument", series.solve_arguments, "passed on to `radiosity solve` (repeat)");
+  app.add_flag("--chosen", series.chosen_texels, "texels are chosen by the program; else they are of one size");
   app.add_option("--sky", series.sky, "of scenes in which nothing shines, as `radiosity solve` takes it")
       ->capture_default_str();
   app.add_flag("--no-cycles", options.no_cycles, "leave Cycles out");

@@ -48,7 +48,8 @@ class RunningServer {
   RunningServer(const Options& options, const std::vector<std::string>& more) {
     auto program = cli::findServerProgram();
     if (!program) throw std::runtime_error(program.error().text());
-    std::vector<std::string> arguments = {"--error", fmt::format("{}", options.error), "--max-clients", "1000"};
+    std::vector<std::string> arguments = {"--uniform", "--error", fmt::format("{}", options.error), "--max-clients",
+                                          "1000"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     auto started = cli::ServerProcess::start({*program, arguments, [] { return true; }, false});
     if (!started) throw std::runtime_error(started.error().text());

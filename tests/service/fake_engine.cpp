@@ -148,7 +148,7 @@ void FakeEngine::progress(double error, engine::SolveState state) {
   {
     const std::lock_guard lock(mutex_);
     status_.state = state;
-    status_.error.total = error;
+    status_.error.total = status_.error.texels = error;
     status_.shots += 100;
     status_.seconds += 0.1;
     status_.load_fraction.reset();

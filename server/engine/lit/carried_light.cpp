@@ -115,6 +115,14 @@ class FormerCut {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> triangles_;  ///< by the file's triangle
 };
 
+/// 1 up to `good`, 0 from `bad` on, smooth.
+double shareBetween(double error, double good, double bad) {
+  if (!(error < bad)) return 0.0;
+  if (error <= good) return 1.0;
+  const double t = std::log(bad / error) / std::log(bad / good);
+  return t * t * (3.0 - 2.0 * t);
+}
+
 class Carrier {
  public:
   Carrier(const ShownScene& before, const Scene& scene, const PatchScene& patches)
@@ -185,11 +193,13 @@ std::vector<LightmapPage> carryLight(const ShownScene& before, const Scene& scen
 
 double newLightShare(double error, double target_error) {
   // An edit seldom changes more than a third of the light of what it leaves in place; above that the old is nearer.
-  const double good = std::max(0.05, target_error), bad = std::max(0.3, 4.0 * good);
-  if (!(error < bad)) return 0.0;
-  if (error <= good) return 1.0;
-  const double t = std::log(bad / error) / std::log(bad / good);
-  return t * t * (3.0 - 2.0 * t);
+  const double good = std::max(0.05, target_error);
+  return shareBetween(error, good, std::max(0.3, 4.0 * good));
+}
+
+double refinedLightShare(double error, double old_error) {
+  constexpr double kNoisy = 2.0;  // so many times as far off, noise is seen before what is sharper
+  return shareBetween(error, old_error, kNoisy * old_error);
 }
 
 std::vector<LightmapPage> replacePart(std::vector<LightmapPage> shown, const std::vector<LightmapPage>& part,

@@ -26,6 +26,10 @@ struct ShownScene {
 /// fraction) is so large that light is missing, 1 from the target error or 5 % on, smooth in between.
 [[nodiscard]] double newLightShare(double error, double target_error);
 
+/// The same where the carried light is that of the same scene on coarser texels, with such an error at the surface: it
+/// goes where the new one is as good, not before.
+[[nodiscard]] double refinedLightShare(double error, double old_error);
+
 /// shown - part + fresh, nowhere below 0; all of one layout. `part` is a part of what is shown, `fresh` what takes its
 /// place.
 [[nodiscard]] std::vector<scene::LightmapPage> replacePart(std::vector<scene::LightmapPage> shown,

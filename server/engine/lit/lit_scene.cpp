@@ -61,6 +61,7 @@ Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, 
   if (former != nullptr) {
     lit->layout_ = former->layout_;
     lit->draft_error_ = former->draft_error_;
+    lit->closer_ = former->closer_;
   } else {
     lit->setLayout(std::move(layout));
   }
@@ -104,6 +105,10 @@ void LitScene::setLayout(scene::TexelLayout layout) {
 
 WantedTexels LitScene::wantedTexels() const {
   return engine::wantedTexels(*patches_, *solver_, surface_probe_.measured(), settings_, patch_count_);
+}
+
+std::optional<double> LitScene::enoughTexels() const {
+  return engine::enoughTexels(*patches_, *solver_, surface_probe_.measured(), settings_);
 }
 
 void LitScene::take(scene::BuiltScene built) {
@@ -237,7 +242,7 @@ double LitScene::emittedPower() const {
 
 void LitScene::makeSolver(const solver::FormerSolver* former) {
   solver::SolverSettings settings;
-  settings.target_error = solverTarget(settings_, draft_error_);
+  settings.target_error = solverTarget(settings_, draft_error_, closer_);
   settings.seed = settings_.seed;
   settings.method = settings_.method;
   settings.link_memory = settings_.link_memory_bytes;
@@ -250,6 +255,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
 
 void LitScene::restart(const SolveSettings& settings) {
   settings_ = settings;
+  old_error_ = 1.0;
   if (stale_) materials_ = scene::shadePatches(*scene_, *patches_);
   makeSolver();
   stale_ = false;
@@ -278,6 +284,7 @@ std::shared_ptr<const scene::Document> LitScene::reshade(scene::Document documen
                                                          const SceneChange& change) {
   auto before = std::exchange(document_, std::make_shared<const scene::Document>(std::move(document)));
   scene_ = std::move(next);
+  old_error_ = 1.0;
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
     const std::string place = "/materials/" + std::to_string(material) + " ";  // what was said of its former self
@@ -291,6 +298,13 @@ std::shared_ptr<const scene::Document> LitScene::reshade(scene::Document documen
   if (!was_stale && affectedBy(change, *scene_) > 0) updateSolver(!change.materials.empty(), other_lights);
   stale_ = was_stale;
   return before;
+}
+
+double LitScene::shownError() const {
+  if (const auto& measured = surface_probe_.stated()) return measured->total;
+  const auto& error = solver_->error();
+  const double between = std::isfinite(error.discretization) ? error.discretization : 0.0;
+  return std::min(old_error_, std::hypot(error.total, between));
 }
 
 void LitScene::fadeFrom(LitScene& before, bool same_layout) {
@@ -403,6 +417,7 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
 bool LitScene::setSky(const SolveSettings& settings) {
   settings_ = settings;
   if (sources_ == lightSources(*scene_)) return false;
+  old_error_ = 1.0;
   const bool was_stale = std::exchange(stale_, true);
   if (!was_stale) updateSolver(false, true);
   stale_ = was_stale;
@@ -469,7 +484,9 @@ std::vector<scene::LightmapPage> LitScene::shownPages() {
     return pages();
   }
   solver_->assess();
-  new_share_ = std::max(new_share_, newLightShare(solver_->error().total, settings_.target_error));
+  const double error = solver_->error().total;
+  new_share_ = std::max(new_share_, old_error_ < 1.0 ? refinedLightShare(error, old_error_)
+                                                     : newLightShare(error, settings_.target_error));
   if (new_share_ >= 1.0) {
     endFade();
     return pages();

@@ -1,6 +1,7 @@
 // One scene and everything derived from it: document, values, patches, materials, solver. Belongs to the solve thread.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -140,7 +141,7 @@ class LitScene {
   /// Another target or time limit: the solve goes on from where it is.
   void retarget(const SolveSettings& settings) {
     settings_ = settings;
-    solver_->setTargetError(solverTarget(settings_, draft_error_));
+    solver_->setTargetError(solverTarget(settings_, draft_error_, closer_));
   }
 
   /// Finds out where light is lost, once a solve has come to its end: warnings() names it. Costs nothing where little
@@ -189,14 +190,32 @@ class LitScene {
   [[nodiscard]] bool lacksSurface() const { return surface_probe_.isLacking(); }
   /// Nothing: it is not measured.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& surfaceError() const { return surface_probe_.stated(); }
+  /// ErrorEstimate::total, of what viewers see.
+  [[nodiscard]] double shownError() const;
+  /// After fadeFrom(): what is shown until this scene's own light is as good is the light of the same scene on coarser
+  /// texels, with such an error at the surface.
+  void setOldError(double error) { old_error_ = error; }
   /// Where the program chooses texels: these are not enough, and tell where others are to be finer. Before
   /// startSolve(). `error`: that is likely to be left by texels; light need not be known much better. 0: they are to
   /// stay.
   void setDraft(double error) { draft_error_ = error; }
   [[nodiscard]] double draftError() const { return draft_error_; }
   [[nodiscard]] bool isDraft() const { return draft_error_ > 0.0; }
+  /// These texels are fine enough, and light on them is not known well enough: the solve goes on from where it is.
+  /// False: it is at that already. `share`: of what the solver leaves now, what it may leave.
+  [[nodiscard]] bool solveCloser(double share) {
+    if (closer_ <= kClosest) return false;
+    setCloser(std::max(kClosest, closer_ * share));
+    retarget(settings_);
+    return true;
+  }
+  /// All such shares together; before startSolve().
+  void setCloser(double share) { closer_ = share; }
+  [[nodiscard]] double closer() const { return closer_; }
   /// Once surfaceError() is there: what texels there should be for the target, about.
   [[nodiscard]] WantedTexels wantedTexels() const;
+  /// Likewise: how many there would have to be, be that more than there may be. Nothing: that cannot be told.
+  [[nodiscard]] std::optional<double> enoughTexels() const;
 
  private:
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> build(scene::EditedDocument edited,
@@ -259,6 +278,7 @@ class LitScene {
   bool reproducible_ = true;
   scene::TexelLayout layout_;
   double draft_error_ = 0.0;                   // setDraft()
+  double closer_ = 1.0;                        // setCloser()
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                 // that the solver knows of
@@ -268,6 +288,7 @@ class LitScene {
   std::vector<scene::LightmapPage> old_light_;   // what was shown before an edit; empty: no fade
   std::vector<scene::LightmapPage> old_direct_;  // of it, what came straight from lights; empty: not known, or replaced
   double new_share_ = 0.0;                       // of the solver's own light in what is shown; never falls
+  double old_error_ = 1.0;                       // of the light of coarser texels, which is shown until then
   std::size_t slow_links_ = std::size_t{64} << 20;
   bool until_settled_ = false;  // old_light_ has the lights' new part, and stands in for that long
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "server/engine/engine.h"
@@ -20,17 +21,26 @@ inline constexpr double kPilotDraft = 0.06;
 [[nodiscard]] std::uint64_t texelBudget(const SolveSettings& settings);
 
 /// What is stated at the surface is of both, the solver's error and that of texels: the solver's part. `draft_error`:
-/// that texels leave which are to be replaced; 0: they are to stay.
-[[nodiscard]] double solverTarget(const SolveSettings& settings, double draft_error);
+/// that texels leave which are to be replaced; 0: they are to stay. `closer`: of that, what was not enough.
+[[nodiscard]] double solverTarget(const SolveSettings& settings, double draft_error, double closer);
+/// It is never less: to be sure of an error that is nearly all texels' own takes for ever.
+inline constexpr double kClosest = 0.25;
 
 struct WantedTexels {
   scene::TexelLayout layout;
-  double error = 0.0;   ///< that is likely to be left by them alone
-  double texels = 0.0;  ///< in all
+  double error = 0.0;    ///< that is likely to be left by them alone
+  double present = 0.0;  ///< likewise by those that there are
+  double texels = 0.0;   ///< in all
 };
 /// For the target, about; `patch_count`: that there are. Cost: some passes over the leaves.
 [[nodiscard]] WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver& solver,
                                         std::span<const solver::SurfaceError::Measured> measured,
                                         const SolveSettings& settings, std::uint64_t patch_count);
+
+/// How many would be enough for the target, about, however many there may be; nothing: those that there are cannot
+/// tell.
+[[nodiscard]] std::optional<double> enoughTexels(const scene::PatchScene& patches, const solver::Solver& solver,
+                                                 std::span<const solver::SurfaceError::Measured> measured,
+                                                 const SolveSettings& settings);
 
 }  // namespace radiosity::engine

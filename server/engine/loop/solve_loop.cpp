@@ -171,7 +171,7 @@ void SolveLoop::takeTurn() {
       lit_->giveUpSurface();
       return updateStatus(true);
     }
-    if (refinement_ && refined_times_ < kMostLayouts) return keepTexels("out of memory");
+    if (refinement_ && refined_times_ < kMostLayouts) return giveUpTexels("out of memory");
     if (refinement_) return endRefinement(refinement_->otherwise, refinement_->why);
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had

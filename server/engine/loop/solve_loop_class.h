@@ -139,7 +139,8 @@ class SolveLoop final : public Engine {
   void judgeTexels();
   void endRefinement(SolveState state, std::string why);
   void orderRefined(WantedTexels wanted);
-  void keepTexels(const std::string& why);
+  void giveUpTexels(const std::string& why);
+  void keepTexels();
   void takeRefined();
   void dropRefinement();
   [[nodiscard]] bool isOutOfTime() const { return settings_.time_limit_s && seconds_ >= *settings_.time_limit_s; }

@@ -15,8 +15,26 @@ namespace {
 
 /// With more of the texels that there may be than this there is no other layout to come.
 constexpr double kNearlyAll = 0.8;
-/// Another layout is worth it where it is to have so many times as many texels.
-constexpr double kWorthwhile = 1.05;
+/// Texels that leave less than so much of the target stay: to solve for light on them more closely takes less than to
+/// begin anew on others.
+constexpr double kFineEnough = 0.9;
+/// Of the square of a target that was missed, what is aimed at.
+constexpr double kNearTarget = 0.95;
+/// Another layout, be it of more texels or of as many elsewhere, is worth it where it is to leave no more than so much.
+constexpr double kWorthwhile = 0.9;
+
+/// Of what light on texels is off by now, at the surface, what it may be off by there. `left`: it and texels together.
+double noiseShare(double left, double texels, double target) {
+  constexpr double kLeast = 0.5, kMost = 0.9;  // what is measured is by chance off by some hundredths
+  const double now = left * left - texels * texels, wanted = kNearTarget * target * target - texels * texels;
+  return now > 0.0 && wanted > 0.0 ? std::clamp(std::sqrt(wanted / now), kLeast, kMost) : kLeast;
+}
+
+/// More of them would be a promise. Above 0.
+double inTwoDigits(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  return unit * std::round(value / unit);
+}
 
 }  // namespace
 
@@ -44,11 +62,21 @@ void SolveLoop::judgeTexels() {
   if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
-  const bool is_worthwhile = lit_->draftError() > 0.0 || wanted.texels >= kWorthwhile * texels;
+  const bool is_worthwhile = wanted.error <= kWorthwhile * wanted.present;
+  if (lit_->isDraft() && (!is_worthwhile || wanted.present < kFineEnough * settings_.target_error)) return keepTexels();
+  const bool can_solve = refinement_->otherwise != SolveState::kLimited && !lit_->isDraft();
+  const double fine = refined_times_ < kMostLayouts && is_worthwhile ? kFineEnough : 1.0;
+  if (can_solve && wanted.present < fine * settings_.target_error &&
+      lit_->solveCloser(noiseShare(left, wanted.present, settings_.target_error)))
+    return dropRefinement();
   if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted));
   if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
-  endRefinement(SolveState::kLimited, fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface",
-                                                  texels, settings_.texels, 100.0 * left));
+  auto why = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
+                         settings_.texels, 100.0 * left);
+  const auto enough = lit_->enoughTexels();
+  if (enough && *enough > static_cast<double>(settings_.texels))
+    why += fmt::format("; about {:.0f} would reach {:.2g} %", inTwoDigits(*enough), 100.0 * settings_.target_error);
+  endRefinement(SolveState::kLimited, std::move(why));
 }
 
 void SolveLoop::endRefinement(SolveState state, std::string why) {
@@ -60,22 +88,28 @@ void SolveLoop::endRefinement(SolveState state, std::string why) {
 
 /// The last layout there can be is no draft.
 void SolveLoop::orderRefined(WantedTexels wanted) {
+  log::info("{} texels leave {:.2g} % at the surface after {:.2f} s, {:.2g} % by themselves: {:.0f} are laid out",
+            lit_->patchCount(), 100.0 * lit_->surfaceError()->total, seconds_, 100.0 * wanted.present, wanted.texels);
   const bool is_last = wanted.error <= settings_.target_error || refined_times_ + 1 == kMostLayouts ||
                        wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
   try {
     RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.layout),
-                           is_last ? 0.0 : wanted.error};
+                           is_last ? 0.0 : std::max(wanted.error, kPilotDraft)};
     refinement_->job = std::make_unique<RefineJob>(std::move(order), *transport_, [this] { queue_.wake(); });
   } catch (const std::system_error& error) {
-    keepTexels(error.what());
+    giveUpTexels(error.what());
   }
 }
 
-/// None take their place: light is solved for as well as was asked for on those that there are.
-void SolveLoop::keepTexels(const std::string& why) {
+void SolveLoop::giveUpTexels(const std::string& why) {
   log::warn("texels stay as they are: {}", why);
-  dropRefinement();
   refined_times_ = kMostLayouts;
+  keepTexels();
+}
+
+/// None take their place: light is solved for as well as was asked for on those that there are.
+void SolveLoop::keepTexels() {
+  dropRefinement();
   lit_->setDraft(0.0);
   lit_->retarget(settings_);
 }
@@ -86,6 +120,8 @@ void SolveLoop::takeRefined() {
   if (!made) return;
   seconds_ += refinement_->job->seconds();
   if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
+  const auto& measured = lit_->surfaceError();
+  const double shown = measured ? measured->total : 1.0;
   dropRefinement();
   ++refined_times_;
   const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit());
@@ -95,8 +131,9 @@ void SolveLoop::takeRefined() {
       if (willRecover(lit.error())) return;
       state_ = SolveState::kFailed;
     }
-    return state_ == SolveState::kSolving ? keepTexels(lit.error().text()) : void();
+    return state_ == SolveState::kSolving ? giveUpTexels(lit.error().text()) : void();
   }
+  lit_->setOldError(shown);
   unpublished_ = true;
   publishLightmaps(false);
   updateStatus(true);

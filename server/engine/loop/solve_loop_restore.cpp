@@ -112,12 +112,14 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
   const auto file = options_.store->folder() / "checkpoint";
   auto checkpoint = checkpoints_ ? state::readCheckpoint(file) : Result<std::optional<Bytes>>();
   double seconds = 0.0;
+  int layouts = 0;
   if (!checkpoint) {
     log::warn("the solve begins anew: {}", checkpoint.error().text());
   } else if (*checkpoint) {
     auto resumed = withinMemory([&] { return resumedScene(document, **checkpoint); });
     if (resumed) {
       seconds = seconds_;
+      layouts = refined_times_;
       if (auto lit = relight(std::move(resumed), Relation::kResumed); !lit) return tl::unexpected<Error>(lit.error());
       resumed_shots_ = lit_->solver().shots();
     } else {
@@ -129,6 +131,7 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
   }
   beginSolve();
   seconds_ = seconds;
+  refined_times_ = layouts;
   checkpoint_revision_ = resumed_shots_ > 0 ? revision_ : 0;
   checkpoint_shots_ = resumed_shots_;
   return {};
@@ -175,6 +178,8 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, head.layout, limits_);
   if (!lit) return lit;
   (*lit)->setDraft(head.draft_error);
+  (*lit)->setCloser(head.closer);
+  refined_times_ = static_cast<int>(std::min<std::uint32_t>(head.layouts, kMostLayouts));
   (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since

@@ -124,6 +124,8 @@ bool SolveLoop::takeCheckpoint() {
   head.sides = lit_->sides();
   head.layout = lit_->layout();
   head.draft_error = lit_->draftError();
+  head.closer = lit_->closer();
+  head.layouts = static_cast<std::uint32_t>(refined_times_);
   CheckpointHead::visit(to, head);
   const bool large = lit_->solver().linkCounters().bytes > 2 * options_.checkpoint_bytes;
   if (!large && !lit_->save(to)) return false;

@@ -29,12 +29,15 @@ struct CheckpointHead {
   scene::SideBits sides;      ///< LitScene::sides()
   scene::TexelLayout layout;  ///< LitScene::layout()
   double draft_error = 0.0;   ///< LitScene::draftError()
+  double closer = 1.0;        ///< LitScene::closer()
+  std::uint32_t layouts = 0;  ///< that were made after one another
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
             self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.adaptive, self.gltf, self.assets,
-            self.sides, self.layout.detail, self.layout.texel_m, self.layout.rough_texel_m, self.draft_error);
+            self.sides, self.layout.detail, self.layout.texel_m, self.layout.rough_texel_m, self.draft_error,
+            self.closer, self.layouts);
   }
 };
 

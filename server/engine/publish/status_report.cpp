@@ -81,7 +81,7 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.shots = solver.shots();
   status.shots_per_second = seconds > 0.0 ? static_cast<double>(status.shots) / seconds : 0.0;
   const auto& error = solver.error();
-  status.error = {error.total, error.residual, error.sampling, error.variation, error.discretization};
+  status.error = {lit.shownError(), error.total, error.residual, error.sampling, error.variation, error.discretization};
   if (const auto& surface = lit.surfaceError())
     status.surface_error = SurfaceEstimate{surface->total, surface->deviation, surface->p95};
   const double target = lit.settings().target_error;

@@ -21,6 +21,8 @@ constexpr double kFinest = 8.0, kCoarsest = 0.5;
 constexpr double kMostDetail = 64.0, kLeastDetail = 0.5;
 /// With fewer of them nothing would be known of what coarser ones hide.
 constexpr double kFewTexels = 64.0;
+/// Lookups average the noise of four texels: of its square they have so much, (2/3)^2, over all places between these.
+constexpr double kLookupNoise = 4.0 / 9.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
 constexpr double kLeastOwn = 0.1;
 
@@ -126,7 +128,7 @@ class DetailChooser {
     for (const auto& place : measured) found[needs_[place.surface].isNarrow() ? 1 : 0] += place.area * place.square;
     for (const auto& need : needs_) {
       const std::size_t kind = need.isNarrow() ? 1 : 0;
-      noise[kind] += need.noise;
+      noise[kind] += kLookupNoise * need.noise;
       expected[kind] += kind == 1 ? need.square : need.error;
     }
     for (auto& need : needs_) {
@@ -153,7 +155,10 @@ class DetailChooser {
     const double gain = sumsAt(high).texels > goal.most_texels && low > 0.0 ? low : high;
     for (const auto& need : needs_) chosen.of_surface.push_back(static_cast<float>(need.detail * detailAt(need, gain)));
     const auto sums = sumsAt(gain);
-    chosen.error = square_ > 0.0 ? std::sqrt(sums.error / square_) : 0.0;
+    chosen.error = relative(sums.error);
+    double present = 0.0;
+    for (const auto& need : needs_) present += need.error;
+    chosen.present = relative(present);
     chosen.texels = sums.texels;
     return chosen;
   }
@@ -206,6 +211,7 @@ class DetailChooser {
     }
   }
 
+  [[nodiscard]] double relative(double error) const { return square_ > 0.0 ? std::sqrt(error / square_) : 0.0; }
   struct Sums {
     double error = 0.0, texels = 0.0;
   };

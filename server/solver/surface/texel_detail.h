@@ -24,6 +24,7 @@ struct DetailGoal {
 struct TexelDetail {
   std::vector<float> of_surface;  ///< Surface::detail that each should have
   double error = 0.0;             ///< that is likely to be left, by texels alone
+  double present = 0.0;           ///< likewise of those that there are
   double texels = 0.0;            ///< that surfaces have then, about
 };
 

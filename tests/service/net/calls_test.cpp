@@ -112,8 +112,8 @@ TEST_F(CallsTest, TheHistoryOfASolveIsToldInNumbersThatJsonHas) {
   engine.progress(std::numeric_limits<double>::infinity());
   calls.handle(R"({"jsonrpc":"2.0","id":"h","method":"solve.history"})");
   EXPECT_THAT(peer->sent().back(),
-              HasSubstr(R"("samples":[{"residual":1.0,"sampling":0.0,"seconds":0.05,"total":1.0)"));
-  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("seconds":0.1,"total":1000000000.0)"));
+              HasSubstr(R"("samples":[{"residual":1.0,"sampling":0.0,"seconds":0.05,"texels":1.0,"total":1.0)"));
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("seconds":0.1,"texels":1000000000.0,"total":1000000000.0)"));
 }
 
 TEST_F(CallsTest, AWaitThatIsOverLeavesNoTimerBehind) {

@@ -15,6 +15,14 @@ import uuid
 from patience import PATIENCE
 
 MARK = "RADIOSITY_TEST_MARK"
+# Most tests name how many texels they want and reckon with that many; a test of chosen texels names CHOSEN.
+CHOSEN = "--chosen-texels"
+
+
+def with_texels(arguments):
+    """Texels of one size, unless CHOSEN says that the program is to choose them."""
+    words = [str(argument) for argument in arguments]
+    return [word for word in words if word != CHOSEN] if CHOSEN in words else [*words, "--uniform"]
 
 
 def program(variable):
@@ -34,7 +42,7 @@ class Server:
         self.log_path = pathlib.Path(folder) / f"radiosityd-{uuid.uuid4().hex}.log"
         with open(self.log_path, "wb") as log:
             self.process = subprocess.Popen(
-                [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *map(str, arguments)],
+                [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *with_texels(arguments)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, env={**os.environ, **(env or {}), MARK: mark})
         self.url = self._listening_url(180 * PATIENCE)
 
@@ -150,9 +158,14 @@ class ServiceCase(unittest.TestCase):
             time.sleep(0.05)
         self.assertEqual(marked_processes(self.mark), [])
 
+    @staticmethod
+    def words(arguments):
+        """The client's arguments."""
+        return with_texels(arguments) if arguments[:1] == ("solve",) else [*map(str, arguments)]
+
     def start(self, *arguments, env=None, stdin=subprocess.DEVNULL):
         """The client, running."""
-        process = subprocess.Popen([program("RADIOSITY"), *map(str, arguments)], stdin=stdin, stdout=subprocess.PIPE,
+        process = subprocess.Popen([program("RADIOSITY"), *self.words(arguments)], stdin=stdin, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True, env={**os.environ, **(env or {}), MARK: self.mark},
                                    cwd=self.folder)
 
@@ -168,7 +181,7 @@ class ServiceCase(unittest.TestCase):
 
     def client(self, *arguments, expect=0, env=None, stdin=None, seconds=300 * PATIENCE):
         """Runs the client to its end; returns (stdout, stderr)."""
-        done = subprocess.run([program("RADIOSITY"), *map(str, arguments)], capture_output=True, text=True,
+        done = subprocess.run([program("RADIOSITY"), *self.words(arguments)], capture_output=True, text=True,
                               input=stdin or "", env={**os.environ, **(env or {}), MARK: self.mark}, cwd=self.folder,
                               timeout=seconds, check=False)
         self.assertEqual(done.returncode, expect, f"{arguments}\nstdout: {done.stdout}\nstderr: {done.stderr}")

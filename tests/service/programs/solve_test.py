@@ -10,7 +10,7 @@ import unittest
 import zlib
 
 import plates
-from harness import ServiceCase, marked_processes, program, waitForLine
+from harness import CHOSEN, ServiceCase, marked_processes, program, waitForLine
 
 QUICK = ("--error", 0.05, "--texels", 2000)
 ENDLESS = ("--error", 1e-6, "--texels", 20000)
@@ -48,9 +48,9 @@ class SolveTest(ServiceCase):
     def check_report(self, report):
         for name in ("seconds", "shots", "patches", "surfaces", "polygons", "revision"):
             self.assertIsInstance(report[name], (int, float), name)
-        self.assertEqual(set(report["error"]), {"total", "residual", "sampling", "variation", "discretization"})
+        self.assertEqual(set(report["error"]), {"total", "p95", "texels", "residual", "sampling", "variation", "discretization"})
         self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
-        self.assertLessEqual(report["error"]["total"], 0.05)
+        self.assertLessEqual(report["error"]["texels"], 0.05)
         self.assertGreater(report["patches"], 500)
         self.assertEqual(report["polygons"], 2)
         self.assertIsInstance(report["gl_renderer"], str)
@@ -69,7 +69,7 @@ class SolveTest(ServiceCase):
         self.assertGreaterEqual(min(min(p) for p in error.pixels), 0)
         # All texels are of one size here; gutters and edges, which are filled from their neighbours, count a little too.
         squares = [sum(v * v for p in page.pixels for v in p) for page in (error, light)]
-        stated = json.loads((self.folder / "r.json").read_text())["error"]["total"]
+        stated = json.loads((self.folder / "r.json").read_text())["error"]["texels"]
         self.assertAlmostEqual((squares[0] / squares[1]) ** 0.5 / stated, 1, delta=0.25)
 
     def test_readsAGltfWithItsBufferBesideIt(self):
@@ -95,8 +95,32 @@ class SolveTest(ServiceCase):
         self.assertIn("time limit", errors)
         self.assertEqual(self.files(), ["lit.glb", "lit.lightmap.0.exr", "plates.glb", "r.json"])
         report = json.loads((self.folder / "r.json").read_text())
-        self.assertGreater(report["error"]["total"], 1e-6)
+        self.assertGreater(report["error"]["texels"], 1e-6)
         self.assertFalse(report["reached"])
+
+    def test_texelsAreChosenUnlessOneSizeIsAskedFor(self):
+        _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--error", 0.02, "--report", "r.json", CHOSEN)
+        self.assertIn("95 % of places within", errors)
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertTrue(report["settings"]["adaptive"])
+        self.assertEqual(report["settings"]["texels"], 1_000_000)
+        self.assertEqual(report["state"], "converged")
+        self.assertLessEqual(report["error"]["total"], 0.02)
+        self.assertGreater(report["error"]["p95"], 0)
+        self.client("solve", self.scene, "-o", "lit.glb", "--error", 0.02, "--report", "r.json")
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertFalse(report["settings"]["adaptive"])
+        self.assertEqual(report["settings"]["texels"], 24_000)
+        self.assertLessEqual(report["error"]["texels"], 0.02)
+
+    def test_anErrorThatSoFewTexelsCannotReachExits3AndSaysHowManyWould(self):
+        _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--error", 0.002, "--texels", 300, "--report", "r.json",
+                                CHOSEN, expect=3)
+        self.assertRegex(errors, r"limited \(texels: \d+ of 300 are used, and .* % are left at the surface; about \d+ would "
+                                 r"reach 0.2 %\)")
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertFalse(report["reached"])
+        self.assertLessEqual(report["patches"], 300)
 
     def test_aSceneWhoseLampIsTurnedAwayStatesNoError(self):
         scene = plates.lit_document()

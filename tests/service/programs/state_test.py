@@ -13,7 +13,7 @@ import urllib.request
 
 import plates
 from edit_load import Ledger, load_for, scene_with_counters
-from harness import MARK, ServiceCase, marked_processes, program
+from harness import CHOSEN, MARK, ServiceCase, marked_processes, program
 from patience import PATIENCE
 from wire import RpcError, Session
 
@@ -246,6 +246,16 @@ class SolveTest(StateCase):
         self.client("solve", self.room, "-o", "kept.glb", "--state", self.state, "--report", "r.json", *SLOW)
         self.assertEqual(self.output("kept"), self.output("whole"))
         self.assertEqual(json.loads((self.folder / "r.json").read_text())["shots"], shots)
+
+    def test_aSolveThatChoosesTexelsGoesOnWithThoseThatItHadChosen(self):
+        chosen = ("--error", 0.015, "--workers", 1, CHOSEN)
+        self.client("solve", self.room, "-o", "whole.glb", "--report", "whole.json", *chosen)
+        for _ in range(2):
+            self.interrupt(signal.SIGTERM, *chosen)
+        self.client("solve", self.room, "-o", "kept.glb", "--state", self.state, "--report", "r.json", *chosen)
+        whole, kept = (json.loads((self.folder / name).read_text()) for name in ("whole.json", "r.json"))
+        self.assertEqual((kept["state"], kept["patches"]), (whole["state"], whole["patches"]))
+        self.assertEqual(self.output("kept"), self.output("whole"))
 
     def test_aKilledSolveGoesOnFromItsLastCheckpoint(self):
         self.interrupt(signal.SIGTERM, *SLOW)

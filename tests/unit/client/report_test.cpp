@@ -16,7 +16,7 @@ protocol::StatusReply someStatus() {
   status.progress.revision = 3;
   status.progress.shots = 1000;
   status.progress.seconds = 1.5;
-  status.progress.error = {0.018, 0.001, 0.017, 0.003, 0.002};
+  status.progress.error = {0.018, 0.0175, 0.001, 0.017, 0.003, 0.002};
   status.progress.energy = {100.0, 90.0, 5.0, 4.0, 1.5, -0.5};
   status.progress.patches = 14'000;
   status.warnings = {"3 triangles dropped", "bad \xFF byte"};
@@ -30,7 +30,7 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
   const auto report = nlohmann::json::parse(reportJson(someStatus(), true));
   for (const auto* name : {"seconds", "shots", "patches", "surfaces", "polygons", "revision"})
     EXPECT_TRUE(report.at(name).is_number()) << name;
-  for (const auto* name : {"total", "residual", "sampling", "variation", "discretization"})
+  for (const auto* name : {"total", "texels", "residual", "sampling", "variation", "discretization"})
     EXPECT_TRUE(report.at("error").at(name).is_number()) << name;
   for (const auto* name : {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
     EXPECT_TRUE(report.at("energy").at(name).is_number()) << name;
@@ -44,11 +44,11 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
 }
 
 TEST(OutcomeText, saysThatTexelsAreTooLargeOnlyWhereTheyAreWhatLimits) {
-  EXPECT_EQ(surfaceText({0.0142, 0.004, 0.0137, 0.001, 0.0381}), "; finer texels would change 3.81 %");
-  EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.003, 0.002}), "");
-  EXPECT_EQ(surfaceText({0.0142, 0.004, 0.0137, 0.001, 0.0381, 0.0637, 0.202}),
-            "; 6.37 % at the surface, 95 % of places within 20.2 %");
-  EXPECT_EQ(surfaceText({0.018, 0.001, 0.017, 0.0, std::nan("")}), "");
+  EXPECT_EQ(surfaceText({0.0407, 0.0142, 0.004, 0.0137, 0.001, 0.0381}), "; texels alone are 1.42 % off");
+  EXPECT_EQ(surfaceText({0.018, 0.0175, 0.001, 0.017, 0.003, 0.002}), "");
+  EXPECT_EQ(surfaceText({0.0637, 0.0142, 0.004, 0.0137, 0.001, 0.0381, 0.202}),
+            "; 95 % of places within 20.2 %; texels alone are 1.42 % off");
+  EXPECT_EQ(surfaceText({0.02, 0.019, 0.004, 0.0137, 0.001, 0.0381, 0.081}), "; 95 % of places within 8.1 %");
 }
 
 TEST(OutcomeText, statesNoErrorWhereNoLightArrives) {
@@ -64,8 +64,9 @@ TEST(OutcomeText, statesNoErrorWhereNoLightArrives) {
 TEST(StatusText, tellsStateErrorAndWarnings) {
   const auto text = statusText(someStatus());
   EXPECT_THAT(text, testing::HasSubstr("state      converged\n"));
-  EXPECT_THAT(
-      text, testing::HasSubstr("1.8 % of 2 % (residual 0.1 %, sampling 1.7 %, variation 0.3 %, discretization 0.2 %)"));
+  EXPECT_THAT(text,
+              testing::HasSubstr(
+                  "1.8 % of 2 % (texels 1.75 %: residual 0.1 %, sampling 1.7 %, variation 0.3 %; between them 0.2 %)"));
   EXPECT_THAT(text, testing::HasSubstr("  3 triangles dropped\n"));
 }
 

@@ -234,13 +234,13 @@ TEST_F(Edits, AMaterialThatNoLitSurfaceHasLeavesTheErrorKnown) {
   solve(scene);
   ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/3/scale","value":[0,0,0]}])"));
   ASSERT_TRUE(reaches(State::kConverged));
-  const auto error = status().error.total;
+  const auto error = status().error.texels;
   const auto outcome =
       patch(R"([{"op":"replace","path":"/materials/3/pbrMetallicRoughness/baseColorFactor","value":[0.2,0.3,0.4,1]}])");
   ASSERT_TRUE(outcome) << outcome.error().text();
   EXPECT_EQ(outcome->affected_surfaces, 0U);
   EXPECT_EQ(status().state, State::kConverged);
-  EXPECT_EQ(status().error.total, error);
+  EXPECT_EQ(status().error.texels, error);
 }
 
 TEST_F(Edits, AppendingWhatNobodyPlacesYetCostsNothing) {

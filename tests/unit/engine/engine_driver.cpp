@@ -238,7 +238,7 @@ testing::AssertionResult EngineTest::reaches(State state) {
       return testing::AssertionSuccess();
     }
     if (now.state != State::kSolving && now.state != State::kLoading && now.state != State::kEmpty) {
-      return testing::AssertionFailure() << "state " << static_cast<int>(now.state) << ", error " << now.error.total
+      return testing::AssertionFailure() << "state " << static_cast<int>(now.state) << ", error " << now.error.texels
                                          << " " << now.failure;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

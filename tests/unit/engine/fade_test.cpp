@@ -40,7 +40,7 @@ TEST_F(Fade, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
   EXPECT_TRUE(published.back()->final);
   // In the end it is the solver's own light, which a solve from nothing finds too.
   const auto shown = published.back()->pages.front()->mips.front().pixels;
-  const double error = status().error.total;
+  const double error = status().error.texels;
   ASSERT_TRUE(restart());
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
@@ -52,7 +52,7 @@ TEST_F(Fade, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
     difference += glm::dot(d, d);
     all += glm::dot(v, v);
   }
-  EXPECT_LE(std::sqrt(difference / all), error + status().error.total);
+  EXPECT_LE(std::sqrt(difference / all), error + status().error.texels);
 }
 
 std::size_t tilesNewerThan(const engine::Lightmaps& lightmaps, std::uint64_t version) {

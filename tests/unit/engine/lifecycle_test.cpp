@@ -36,7 +36,7 @@ TEST_F(Lifecycle, ALoadedSceneIsSolvedToItsTarget) {
     EXPECT_TRUE(toldState(*recorder_, state)) << static_cast<int>(state);
   const auto now = status();
   EXPECT_EQ(now.revision, 1U);
-  EXPECT_LE(now.error.total, kEasy);
+  EXPECT_LE(now.error.texels, kEasy);
   EXPECT_EQ(now.surfaces, 6U);
   EXPECT_GT(now.shots, 0U);
   const auto lightmaps = engine().lightmaps();

@@ -295,7 +295,7 @@ class RandomEdits : public EngineTest {
     ASSERT_EQ(json::parse(sceneText()), documents_[now_].gltf);
     ASSERT_TRUE(ends()) << status().failure;
     const auto edited = pagesOf(*engine().lightmaps());
-    const double edited_error = status().error.total;
+    const double edited_error = status().error.texels;
     std::vector<FreshSolve> fresh;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
       fresh.push_back(solveFresh(*charted_, kTarget, seed));

@@ -62,7 +62,7 @@ TEST_F(Settings, APauseRightAfterAnEditShowsWhatThereIs) {
 
 TEST_F(Settings, TheTimeLimitStopsTheSolveShortOfItsTarget) {
   runOutOfTime();
-  EXPECT_GT(status().error.total, kNever);
+  EXPECT_GT(status().error.texels, kNever);
   EXPECT_GT(status().seconds, 0.0);
   ASSERT_TRUE(engine().lightmaps());
   EXPECT_FALSE(engine().lightmaps()->final);
@@ -85,7 +85,7 @@ TEST_F(Settings, MemoryForLinksThatIsUsedUpEndsTheSolveAboveItsTargetAndAnEditGo
   ASSERT_TRUE(reaches(SolveState::kLimited));
   const auto stopped = status();
   EXPECT_NE(stopped.failure.find("--link-memory"), std::string::npos) << stopped.failure;
-  EXPECT_GT(stopped.error.total, kNever);
+  EXPECT_GT(stopped.error.texels, kNever);
   EXPECT_LE(stopped.counters.at("links.bytes"), 200'000.0);
   ASSERT_TRUE(engine().lightmaps());
   ASSERT_TRUE(configure([](SolveSettings& s) { s.target_error = kEasy; }));
@@ -127,7 +127,7 @@ TEST_F(Settings, ASmallerTargetGoesOnAndALargerOneIsReachedAtOnce) {
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   const auto second = status();
-  EXPECT_LE(second.error.total, kEasy / 4);
+  EXPECT_LE(second.error.texels, kEasy / 4);
   EXPECT_GT(second.shots, first.shots);
   ASSERT_TRUE(configure([](SolveSettings& s) { s.target_error = kNever, s.time_limit_s = 0.0; }));
   (void)sceneText();

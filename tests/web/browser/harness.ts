@@ -33,7 +33,15 @@ export class Server {
   /** Again on the same port after stop(). */
   async start(): Promise<void> {
     const listen = this.url ? new URL(this.url).host : '127.0.0.1:0';
-    const args = [...(this.scene ? [this.scene] : []), '--listen', listen, '--log-level', 'error', ...this.options];
+    const args = [
+      ...(this.scene ? [this.scene] : []),
+      '--listen',
+      listen,
+      '--uniform',
+      '--log-level',
+      'error',
+      ...this.options,
+    ];
     const child = spawn(program('RADIOSITYD'), args, {
       stdio: ['ignore', 'pipe', 'inherit'],
     });

@@ -47,15 +47,17 @@ export interface Progress {
   seconds: number;
   secondsLeft?: number;
   error: {
+    /** What people see: RMS at the surface. */
     total: number;
+    /** RMS of texels alone; the next three are its parts. */
+    texels: number;
     residual: number;
     sampling: number;
     variation?: number;
     discretization: number;
-    /** What people see, once it is measured: RMS at the surface, and what 95 % of places are off by less than. */
-    surface?: number;
+    /** What 95 % of places are off by less than, once that is measured; until then `total` is an estimate. */
     p95?: number;
-    /** They are on their way. */
+    /** It is on its way. */
     measuring?: boolean;
   };
   energy: Record<string, number>;
@@ -74,6 +76,7 @@ export interface Progress {
 export interface ErrorSample {
   seconds: number;
   total: number;
+  texels: number;
   residual: number;
   sampling: number;
   variation: number;

@@ -70,6 +70,7 @@ export class SolvePanel {
   });
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
+  private readonly chosen: HTMLInputElement;
   private readonly bothSides: HTMLInputElement;
   private readonly method: HTMLSelectElement;
   private settings: Settings | undefined;
@@ -88,6 +89,7 @@ export class SolvePanel {
       const value = Math.round(parseNumber(text));
       return value >= 1 ? { texels: value } : undefined;
     });
+    this.chosen = checkbox(true, (on) => actions.configure({ adaptive: on }));
     this.bothSides = checkbox(false, (on) => actions.configure({ doubleSided: on }));
     this.method = select(METHODS, 'gather', (id) => actions.configure({ method: id as Method }));
     this.element = panel(
@@ -105,6 +107,7 @@ export class SolvePanel {
         'Target',
         field('Error, %', this.target),
         field('Texels, approx.', this.texels),
+        field('Finer texels where light wants them', this.chosen),
         field('Light both sides of all surfaces', this.bothSides),
         field('Method', this.method),
       ),
@@ -144,11 +147,10 @@ export class SolvePanel {
         progress.unlit ? `no light arrives: ${progress.unlit}` : `${percent(error.total)} (target ${percent(target)})`,
       ],
       [
-        'At the surface',
-        error.surface === undefined
-          ? '–'
-          : `${percent(error.surface)}, 95 % of places within ${percent(error.p95 ?? error.surface)}`,
+        '95 % of places within',
+        error.p95 !== undefined ? percent(error.p95) : error.measuring ? 'being measured' : '–',
       ],
+      ['Texels alone', percent(error.texels)],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
       ['Within texels', percent(error.variation ?? 0)],
@@ -185,6 +187,9 @@ export class SolvePanel {
     if (!this.settings) return;
     if (this.typing !== this.target) this.target.value = inField(100 * this.settings.targetError);
     if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
+    this.chosen.checked = this.settings.adaptive;
+    const [label] = this.texels.labels ?? [];
+    if (label) label.textContent = this.settings.adaptive ? 'Texels, at most' : 'Texels, approx.';
     this.bothSides.checked = this.settings.doubleSided;
     this.method.value = this.settings.method;
   }

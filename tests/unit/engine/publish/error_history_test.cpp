@@ -15,7 +15,7 @@ namespace {
 using engine::ErrorHistory;
 using engine::kErrorSamples;
 
-engine::ErrorEstimate errorOf(double total) { return {total, 0.6 * total, 0.8 * total, 0.0, 0.01}; }
+engine::ErrorEstimate errorOf(double total) { return {total, total, 0.6 * total, 0.8 * total, 0.0, 0.01}; }
 
 /// Every gap but those of the input itself against the bound that the mean gap sets, and the ends against the input's.
 void expectEven(const std::vector<engine::ErrorSample>& kept, const std::vector<double>& given) {
