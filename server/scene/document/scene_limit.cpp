@@ -56,7 +56,9 @@ std::string sceneMemoryFault(std::uint64_t bytes, const SceneLimit& limit, std::
 
 std::uint64_t bytesOfData(const Document& document) {
   std::uint64_t entries = countOfPrimitives(document);
-  for (const auto* list : {"nodes", "meshes", "accessors"}) entries += countOf(document, list);
+  for (const auto* list : {"meshes", "accessors"}) entries += countOf(document, list);
+  if (document.gltf.contains("nodes"))
+    for (const auto& node : document.gltf["nodes"]) entries += node.contains("mesh") ? 1 : 0;
   std::uint64_t bytes = kEntryBytes * entries;
   for (const auto& buffer : document.buffers) bytes += buffer ? buffer->size() : 0;
   return bytes;

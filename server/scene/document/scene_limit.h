@@ -30,11 +30,11 @@ struct SceneLimit {
 [[nodiscard]] std::string sceneMemoryFault(std::uint64_t bytes, const SceneLimit& limit, std::string_view what);
 
 /// For likelySceneMemory(): the bytes of a checked document's buffers, and a few for each entry of its JSON that places
-/// something. O(meshes).
+/// something. O(meshes + nodes).
 [[nodiscard]] std::uint64_t bytesOfData(const Document& document);
 
 /// Bytes that parsing a checked document takes, about: entries of the JSON's lists. kTooLarge: they are more than the
-/// limit, or than is likely of so few bytes of data. O(meshes).
+/// limit, or than is likely of so few bytes of data. O(meshes + nodes).
 [[nodiscard]] Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits);
 
 }  // namespace radiosity::scene
