@@ -18,8 +18,12 @@ struct SameTriangles {
   [[nodiscard]] bool isFirst(std::uint32_t triangle) const { return follows.empty() || !follows[triangle]; }
 };
 
-/// O(n). `kind`: by triangle; those of another kind are not the same. Empty: all are of one.
+/// O(n), and O(n log n) of corners that somebody chose so that their hashes crowd. `kind`: by triangle; those of
+/// another kind are not the same. Empty: all are of one.
 [[nodiscard]] SameTriangles findSame(std::span<const std::array<glm::vec3, 3>> triangles,
                                      const std::vector<bool>& kind = {});
+
+/// Of the corners' bits: what findSame() keeps triangles by.
+[[nodiscard]] std::uint64_t hashOfCorners(const std::array<glm::vec3, 3>& corners);
 
 }  // namespace radiosity::geometry

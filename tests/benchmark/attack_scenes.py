@@ -193,6 +193,36 @@ def deep_picture(side=8192):
     return _pictured(scene, [{"bufferView": scene.view(_png_of(data, side, 6, 16)), "mimeType": "image/png"}])
 
 
+def inflating_picture(side=16, inflated=1_000_000_000):
+    """A small picture whose data inflates to a thousand million bytes, of which it needs a thousand."""
+    scene, rows = Scene(), zlib.compressobj(9)
+    data = b"".join(rows.compress(bytes(1_000_000)) for _ in range(inflated // 1_000_000)) + rows.flush()
+    return _pictured(scene, [{"bufferView": scene.view(_png_of(data, side, 6)), "mimeType": "image/png"}])
+
+
+def _solid_webp(side):
+    """Lossless, of one colour: each of its five codes has one symbol, so that a pixel takes no bit at all."""
+    bits, at = side - 1 | side - 1 << 14, 28 + 4 + 3  # no alpha, version 0; no transform, no cache, one group of codes
+    for _ in range(5):
+        bits |= 0b0001 << at  # simple, one symbol, of one bit: 0
+        at += 4
+    body = b"\x2f" + bits.to_bytes((at + 7) // 8, "little")
+    chunk = b"VP8L" + struct.pack("<I", len(body)) + body + b"\0" * (len(body) % 2)
+    return b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WEBP" + chunk
+
+
+def solid_webps(count=4, side=8192):
+    """As large as pictures may be, in 26 bytes each."""
+    scene = Scene()
+    scene.gltf["extensionsUsed"].append("EXT_texture_webp")
+    scene.gltf["extensionsRequired"] = ["EXT_texture_webp"]
+    images = [{"bufferView": scene.view(_solid_webp(side)), "mimeType": "image/webp"} for _ in range(count)]
+    _pictured(scene, images)
+    for texture in scene.gltf["textures"]:
+        texture["extensions"] = {"EXT_texture_webp": {"source": texture.pop("source")}}
+    return scene.glb()
+
+
 def tiny_pictures(count=2000, side=64):
     scene = Scene()
     return _pictured(scene, [{"bufferView": scene.view(_png(side, level=i % 256)), "mimeType": "image/png"}
@@ -231,6 +261,45 @@ def many_triangles(side=400):
             a = z * (side + 1) + x
             corners += [a, a + side + 1, a + 1, a + 1, a + side + 1, a + side + 2]
     scene.node(mesh=scene.mesh(points, corners), translation=[-0.05 * side, 0, -0.05 * side])
+    return scene.glb()
+
+
+def entries_of(name, most=1 << 20):
+    """A mebibyte of what takes three bytes each, and more once it is read."""
+    def make():
+        scene = Scene()
+        scene.gltf.setdefault(name, []).extend([{}] * ((most - len(scene.glb()) - 64) // 3))
+        return scene.glb()
+    return make
+
+
+def point_lights(count=18_000):
+    """Lamps, as many as a mebibyte holds."""
+    scene = Scene()
+    scene.gltf["extensionsUsed"].append("KHR_lights_punctual")
+    scene.gltf["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 9}]}}
+    for _ in range(count):
+        scene.node(extensions={"KHR_lights_punctual": {"light": 0}})
+    return scene.glb()
+
+
+def shining_squares(count=14_000):
+    """Lamps that are surfaces."""
+    scene, side = Scene(), math.isqrt(count) + 1
+    for i in range(count):
+        scene.node(mesh=1, translation=[2 * (i % side), 0, 2 + 2 * (i // side)])
+    return scene.glb()
+
+
+def poses(vertices=20_000, count=10_000):
+    """Each node has a mesh of its own in memory, since each has weights of its own."""
+    scene, dice = Scene(), random.Random(1)
+    points = [(dice.random(), dice.random(), dice.random()) for _ in range(vertices)]
+    mesh = scene.mesh(points, [i % vertices for i in range(3 * vertices)][:3000])
+    primitive = scene.gltf["meshes"][mesh]["primitives"][0]
+    primitive["targets"] = [{"POSITION": primitive["attributes"]["POSITION"]}]
+    for i in range(count):
+        scene.node(mesh=mesh, weights=[i / count])
     return scene.glb()
 
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/scene/document/scene_limit.h"
-
 namespace radiosity::scene {
 namespace {
 
@@ -19,7 +17,8 @@ DecodedBuffer::DecodedBuffer(const Document& document, const ImportLimits& limit
   std::uint64_t bytes_of_data = 0;
   for (const auto& buffer : document.buffers) bytes_of_data += buffer->size();
   bytes_ = std::min(bytes_of_data, most_);
-  memory_ = std::min(sceneMemoryLimit(limits), likelySceneBytes(limits, bytes_of_data));
+  memory_ = std::min(sceneMemoryLimit(limits), likelySceneMemory(limits, bytes_of_data),
+                     [](const SceneLimit& a, const SceneLimit& b) { return a.bytes < b.bytes; });
 }
 
 Result<void> DecodedBuffer::claim(std::uint64_t bytes, std::uint64_t working, const std::string& where) {
@@ -29,7 +28,7 @@ Result<void> DecodedBuffer::claim(std::uint64_t bytes, std::uint64_t working, co
   }
   bytes_ += bytes;
   const auto wanted = claimed_ + kCopies * (bytes + kAlignment) + working;
-  if (wanted > memory_)
+  if (wanted > memory_.bytes)
     return fail(ErrorCode::kTooLarge, sceneMemoryFault(wanted, memory_, "its decoded geometry"), where);
   claimed_ = wanted - working;
   return {};

@@ -11,6 +11,7 @@
 #include "common/result.h"
 #include "server/scene/document/document.h"
 #include "server/scene/document/json_text.h"
+#include "server/scene/document/scene_limit.h"
 
 namespace radiosity::scene {
 
@@ -22,7 +23,7 @@ class DecodedBuffer {
   /// Before so many bytes are made, for which decoding needs `working` more. kTooLarge: there is no room.
   [[nodiscard]] Result<void> claim(std::uint64_t bytes, std::uint64_t working, const std::string& where);
   /// What may still be claimed.
-  [[nodiscard]] std::uint64_t room() const { return memory_ - claimed_; }
+  [[nodiscard]] std::uint64_t room() const { return memory_.bytes - claimed_; }
 
   /// Bytes that were claimed, which `view` then names; its other members stay.
   void put(Bytes bytes, Json& view);
@@ -34,7 +35,8 @@ class DecodedBuffer {
 
  private:
   std::size_t index_ = 0, size_ = 0;
-  std::uint64_t most_ = 0, memory_ = 0, claimed_ = 0, bytes_ = 0;
+  std::uint64_t most_ = 0, claimed_ = 0, bytes_ = 0;
+  SceneLimit memory_;
   std::vector<Bytes> pieces_;
 };
 

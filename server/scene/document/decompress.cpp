@@ -86,7 +86,12 @@ class Decompressor {
       if (auto ok = decodeView(views[i], *extension, at(pointer), at(pointer + "/extensions/" + name)); !ok) return ok;
       eraseMeshopt(views[i]);
     }
-    for (auto& buffer : entries("buffers")) eraseMeshopt(buffer);
+    for (auto& buffer : entries("buffers")) {
+      // Of data that was not read, be it a file or a data URI, nobody needs the place once all that it holds is
+      // decoded.
+      if (isFallbackBuffer(buffer)) buffer.erase("uri");
+      eraseMeshopt(buffer);
+    }
     return {};
   }
 

@@ -10,6 +10,7 @@
 #include "server/scene/document/document_uri.h"
 #include "server/scene/document/glb.h"
 #include "server/scene/document/import_schema.h"
+#include "server/scene/document/scene_limit.h"
 
 namespace radiosity::scene {
 namespace {
@@ -143,6 +144,8 @@ Result<Document> parse(std::string name, std::span<const std::uint8_t> bytes, co
   if (auto ok = checkSchema(document.gltf, document.name, warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = checkExtensions(document.gltf, document.name, warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = Loader(document, chunks, folder, limits).run(); !ok) return tl::unexpected(ok.error());
+  // Defaults take a hundred times what an empty entry has in the file.
+  if (const auto claimed = claimOfJson(document, limits); !claimed) return tl::unexpected(claimed.error());
   materialiseDefaults(document.gltf);
   return document;
 }

@@ -104,7 +104,7 @@ Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, co
   }
   const auto limit = sceneMemoryLimit(limits);
   const auto decoder = kDecoderBytes * plan.largest_pixels;
-  const auto room = claimed + decoder < limit ? limit - claimed - decoder : 0;
+  const auto room = claimed + decoder < limit.bytes ? limit.bytes - claimed - decoder : 0;
   halveLargest(sizes, used, std::min(kMostImageBytes, room / kShadedThirds * kDecodedThirds), plan);
   plan.two_at_once = plan.largest_pixels <= kMostOfTwo && plan.bytes + decoder <= room;
   if (plan.bytes > room)

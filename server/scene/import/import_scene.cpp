@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/scene/document/import_schema.h"
+#include "server/scene/document/scene_limit.h"
 #include "server/scene/import/import_check.h"
 #include "server/scene/import/import_context.h"
 #include "server/scene/import/import_lint.h"

@@ -12,14 +12,10 @@
 namespace radiosity::scene {
 namespace {
 
-/// Bytes, measured at the peak of loading scenes of 10,000 to 160,000 of each: JSON with its defaults, a copy of it as
-/// the parser wants it, and what the parser makes of that.
-constexpr std::uint64_t kNodeBytes = 3'000, kMaterialBytes = 9'000, kMeshBytes = 2'000, kAccessorBytes = 1'500;
 /// A placed triangle as it is flattened, charted and held in trees; an instance, with its surface.
 constexpr std::uint64_t kTriangleBytes = 900, kInstanceBytes = 1'000;
 /// The same in each process that draws: of a triangle a fifth is what Embree makes of it, at its peak.
 constexpr std::uint64_t kDrawnTriangleBytes = 850, kDrawnInstanceBytes = 300;
-constexpr std::uint64_t kEntryBytes = 16;     ///< of JSON, at least, that places something
 constexpr std::uint64_t kElementBytes = 240;  ///< of EXT_mesh_gpu_instancing: transform and instance
 /// A vertex as it is read, with maps that find doubled triangles; its attributes; a corner of a triangle.
 constexpr std::uint64_t kVertexBytes = 36, kCornerBytes = 40;
@@ -38,8 +34,13 @@ class GeometryClaim {
  public:
   GeometryClaim(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
                 const ImportLimits& limits)
-      : document_(document), model_(model), limits_(limits), limit_(sceneMemoryLimit(limits)), bytes_(claimed) {
-    likely_ = likelySceneBytes(limits, bytesOfData());
+      : document_(document),
+        model_(model),
+        limits_(limits),
+        limit_(sceneMemoryLimit(limits)),
+        bytes_(claimed),
+        of_server_(claimed) {
+    likely_ = likelySceneMemory(limits, bytesOfData(document));
     for (const auto& mesh : model.meshes) {
       MeshClaim claim;
       for (const auto& primitive : mesh.primitives) add(primitive, claim);
@@ -76,13 +77,6 @@ class GeometryClaim {
     claim.vertex_bytes += times(vertices, each) + times(corners, is_list ? kCornerBytes : 3 * kCornerBytes);
     claim.triangles += is_list ? corners / 3 : corners;
     ++claim.primitives;
-  }
-
-  [[nodiscard]] std::uint64_t bytesOfData() const {
-    std::uint64_t bytes = kEntryBytes * (model_.nodes.size() + model_.meshes.size() + model_.accessors.size());
-    for (const auto& buffer : document_.buffers) bytes += buffer ? buffer->size() : 0;
-    for (const auto& mesh : model_.meshes) bytes += kEntryBytes * mesh.primitives.size();
-    return bytes;
   }
 
   [[nodiscard]] std::vector<int> rootNodes() const {
@@ -131,43 +125,23 @@ class GeometryClaim {
   Result<void> spend(std::uint64_t bytes, const std::string& pointer, std::string_view what) {
     bytes_ += bytes;
     of_server_ += bytes;
-    if (of_server_ > likely_) {
-      return fail(ErrorCode::kTooLarge, sceneMemoryFault(of_server_, likely_, what) + " for so few bytes of data",
-                  radiosity::scene::place(document_.name, pointer));
-    }
-    if (bytes_ <= limit_) return {};
-    return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes_, limit_, what),
-                radiosity::scene::place(document_.name, pointer));
+    const auto where = [&] { return radiosity::scene::place(document_.name, pointer); };
+    if (of_server_ > likely_.bytes)
+      return fail(ErrorCode::kTooLarge, sceneMemoryFault(of_server_, likely_, what), where());
+    if (bytes_ > limit_.bytes) return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes_, limit_, what), where());
+    return {};
   }
 
   const Document& document_;
   const tinygltf::Model& model_;
   const ImportLimits& limits_;
-  std::uint64_t limit_, bytes_, instances_ = 0;
-  std::uint64_t of_server_ = 0, likely_ = ~std::uint64_t{0};
+  SceneLimit limit_, likely_;
+  std::uint64_t bytes_, of_server_, instances_ = 0;
   std::vector<MeshClaim> meshes_;
   std::set<std::tuple<int, int, std::vector<double>>> poses_;  ///< mesh, skin, weights
 };
 
 }  // namespace
-
-Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits) {
-  const auto& gltf = document.gltf;
-  const auto count = [&](const char* list) -> std::uint64_t { return gltf.contains(list) ? gltf[list].size() : 0; };
-  const auto limit = sceneMemoryLimit(limits);
-  std::uint64_t bytes = 0, primitives = 0;
-  if (gltf.contains("meshes"))
-    for (const auto& mesh : gltf["meshes"]) primitives += mesh["primitives"].size();
-  for (const auto& [pointer, entries, each] :
-       {std::tuple("/nodes", count("nodes"), kNodeBytes), std::tuple("/materials", count("materials"), kMaterialBytes),
-        std::tuple("/meshes", count("meshes") + primitives, kMeshBytes),
-        std::tuple("/accessors", count("accessors"), kAccessorBytes)}) {
-    bytes += times(entries, each);
-    if (bytes <= limit) continue;
-    return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes, limit, "its entries"), place(document.name, pointer));
-  }
-  return bytes;
-}
 
 Result<std::uint64_t> claimOfGeometry(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
                                       const ImportLimits& limits) {

@@ -9,11 +9,8 @@
 
 namespace radiosity::scene {
 
-/// Bytes that parsing takes, about: entries of the JSON's lists. kTooLarge: they are more than the limit. O(meshes).
-[[nodiscard]] Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits);
-
 /// Bytes that the geometry of the scene to show takes, about: vertices of each primitive in each pose, placed triangles
-/// and instances, in the server and in each renderer, elements of EXT_mesh_gpu_instancing. `claimed`: what the rest
+/// and instances, in the server and in each renderer, elements of EXT_mesh_gpu_instancing. `claimed`: what the JSON
 /// takes. kTooLarge, naming the primitive or the node at fault: all is more than the limit, or than is likely of so few
 /// bytes of data where no limit is named, or there are more instances than ImportLimits::max_nodes. Needs a checked
 /// model. O(nodes + primitives, log of the poses).

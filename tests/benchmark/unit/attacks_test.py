@@ -1,6 +1,7 @@
 """The files of attacks.py are what they say, and it counts what it measures where that belongs."""
 import sys
 import unittest
+import zlib
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -15,12 +16,27 @@ class Scenes(unittest.TestCase):
         for make in (attack_scenes.instances_claimed, attack_scenes.accessor_bomb, lambda: attack_scenes.nodes_in_one_place(10),
                      lambda: attack_scenes.leaning_slabs(10), lambda: attack_scenes.leaning_tubes(10),
                      lambda: attack_scenes.cut_off_pictures(3, 16), lambda: attack_scenes.forty_pictures(16),
-                     lambda: attack_scenes.many_nodes(10), lambda: attack_scenes.many_triangles(3)):
+                     lambda: attack_scenes.many_nodes(10), lambda: attack_scenes.many_triangles(3),
+                     lambda: attack_scenes.solid_webps(2, 16), lambda: attack_scenes.inflating_picture(16, 1_000_000),
+                     attack_scenes.entries_of("materials"), lambda: attack_scenes.point_lights(10),
+                     lambda: attack_scenes.shining_squares(10), lambda: attack_scenes.poses(10, 10)):
             glb = plates.Glb(make())
             lamps = [material for material in glb.json["materials"] if material.get("name") == "lamp"]
             self.assertEqual(len(lamps), 1)
             self.assertIn("KHR_materials_emissive_strength", lamps[0]["extensions"])
             self.assertEqual(glb.json["buffers"], [{"byteLength": len(glb.bin) - (-glb.json["buffers"][0]["byteLength"] % 4)}])
+
+    def test_a_picture_inflates_far_beyond_its_pixels(self):
+        glb = plates.Glb(attack_scenes.inflating_picture(16, 3_000_000))
+        view = glb.json["bufferViews"][glb.json["images"][0]["bufferView"]]
+        png = glb.bin[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]
+        length = int.from_bytes(png[33:37], "big")
+        self.assertEqual(png[37:41], b"IDAT")
+        self.assertEqual(len(zlib.decompress(png[41:41 + length])), 3_000_000)
+
+    def test_what_fills_a_mebibyte_does(self):
+        for name in ("nodes", "materials"):
+            self.assertAlmostEqual(len(attack_scenes.entries_of(name)()), 1 << 20, delta=200)
 
     def test_cut_off_pictures_begin_in_one_place_and_end_before_its_end(self):
         glb = plates.Glb(attack_scenes.cut_off_pictures(3, 16))

@@ -232,7 +232,7 @@ TEST(RayScene, CopiesAreMetOneAfterTheOther) {
 TEST(RayScene, InPacketsCopiesAreMetAsByRaysAlone) {
   constexpr std::uint32_t kCount = 60, kCopies = 5;
   const auto all = sceneOf(copiedSoup(kCount, kCopies, 3));
-  std::vector<Ray> rays = raysThrough(64 * kPacket, 5);
+  std::vector<Ray> rays = raysThrough(512 * kPacket, 5);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const auto met = all.nearest(rays[i]);
     if (met.found()) rays[i].own = met.triangle + static_cast<std::uint32_t>(i % kCopies) * kCount;
@@ -281,6 +281,27 @@ TEST(SameTriangles, AreToldFromThoseThatDifferAtAll) {
   const auto same = findSame(std::vector{a, nearly, a, turned, a, nearly}, {false, false, false, false, true, false});
   EXPECT_EQ(same.next, (std::vector{2U, 5U, kNoTriangle, kNoTriangle, kNoTriangle, kNoTriangle}));
   EXPECT_EQ(same.follows, (std::vector{false, false, true, false, false, true}));
+}
+
+/// Of crowded hashes each copy was left in the tree, where a ray that meets one meets all.
+TEST(SameTriangles, AreToldWhereCornersAreChosenSoThatHashesCrowd) {
+  constexpr std::size_t kCrowd = 100, kPlaces = 1024;  // the least table for three of each
+  std::vector<Triangle> crowd;
+  for (const auto& triangle : soup(2 * kCrowd * kPlaces, 2)) {
+    if (hashOfCorners(triangle) % kPlaces == 0 && crowd.size() < kCrowd) crowd.push_back(triangle);
+  }
+  ASSERT_EQ(crowd.size(), kCrowd);
+  std::vector<Triangle> all;
+  for (int copy = 0; copy < 3; ++copy) all.insert(all.end(), crowd.begin(), crowd.end());
+  std::vector<bool> kind(all.size(), false);
+  kind[1] = true;
+  const auto same = findSame(all, kind);
+  ASSERT_EQ(same.next.size(), all.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    const bool is_last = i + kCrowd >= all.size() || i == 1;
+    ASSERT_EQ(same.next[i], is_last ? kNoTriangle : i + kCrowd) << i;
+    ASSERT_EQ(same.isFirst(i), i < kCrowd || i == 1 + kCrowd) << i;
+  }
 }
 
 /// The walls of a room of 0.78 units around `middle`, whose corners are rounded there, as a scene in its unit box.

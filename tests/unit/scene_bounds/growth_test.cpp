@@ -210,6 +210,71 @@ void addUnused(GltfBuilder& builder, int n) {
   for (int i = 0; i < n; ++i) builder.node({{"mesh", 0}, {"translation", {0, 0, 2 * i}}});
 }
 
+/// Triangles that all have one edge, as the pages of a book.
+void addBook(GltfBuilder& builder, int n) {
+  std::vector<float> positions;
+  for (int i = 0; i < n; ++i) {
+    const float angle = 2.0F * 3.14159265F * static_cast<float>(i) / static_cast<float>(n);
+    positions.insert(positions.end(), {0, 0, 0, 0, 0, 1, std::cos(angle), std::sin(angle), 0.5F});
+  }
+  builder.node({{"mesh", meshOf(builder, positions, {})}});
+}
+
+/// Squares of one mesh, apart, whose own lightmap layout has all of them in one place; or in a row, side by side.
+void addIslands(GltfBuilder& builder, int n, bool in_one_place) {
+  std::vector<float> positions, places;
+  for (int i = 0; i < n; ++i) {
+    const auto x = 2.0F * static_cast<float>(i), width = in_one_place ? 1.0F : 1.0F / static_cast<float>(n),
+               u = in_one_place ? 0.0F : width * static_cast<float>(i);
+    for (const auto& [right, up] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}}) {
+      positions.insert(positions.end(), {x + static_cast<float>(right), static_cast<float>(up), 0.0F});
+      places.insert(places.end(), {u + width * static_cast<float>(right), static_cast<float>(up)});
+    }
+  }
+  const auto mesh = meshOf(builder, positions, {});
+  builder.gltf["meshes"][mesh]["primitives"][0]["attributes"]["TEXCOORD_1"] = builder.vec2(places);
+  builder.node({{"mesh", mesh}});
+}
+
+/// Shapes that one square may take.
+void addTargets(GltfBuilder& builder, int n) {
+  const auto mesh = builder.square();
+  auto& primitive = builder.gltf["meshes"][mesh]["primitives"][0];
+  primitive["targets"] = Json::array();
+  for (int i = 0; i < n; ++i) primitive["targets"].push_back({{"POSITION", primitive["attributes"]["POSITION"]}});
+  builder.gltf["meshes"][mesh]["weights"] = std::vector<double>(static_cast<std::size_t>(n), 1.0 / n);
+  builder.node({{"mesh", mesh}});
+}
+
+/// Bones of one skin, and nodes that it moves.
+void addJoints(GltfBuilder& builder, int n) {
+  const auto mesh = builder.square();
+  auto& attributes = builder.gltf["meshes"][mesh]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] = builder.accessor(std::vector<std::uint16_t>(16, 1), 5123, "VEC4", 4);
+  attributes["WEIGHTS_0"] = builder.accessor(std::vector<float>(16, 0.25F), 5126, "VEC4", 4);
+  Json joints = Json::array();
+  for (int i = 0; i < n; ++i) joints.push_back(builder.node({{"translation", {i, 0, 0}}}));
+  builder.gltf["skins"] = {{{"joints", joints}}};
+  for (int i = 0; i < n; ++i) builder.node({{"mesh", mesh}, {"skin", 0}});
+}
+
+/// Places that the file has no data for.
+void addInstances(GltfBuilder& builder, int n) {
+  builder.gltf["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  const auto mesh = builder.square();
+  builder.gltf["accessors"].push_back({{"componentType", 5126}, {"count", n}, {"type", "VEC3"}});
+  const Json attributes = {{"TRANSLATION", builder.gltf["accessors"].size() - 1}};
+  builder.node({{"mesh", mesh}, {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}});
+}
+
+/// Lamps that are surfaces, beside each other.
+void addLamps(GltfBuilder& builder, int n) {
+  const auto mesh = builder.square();
+  builder.gltf["materials"] = {{{"emissiveFactor", {1, 1, 1}}}};
+  builder.gltf["meshes"][mesh]["primitives"][0]["material"] = 0;
+  for (int i = 0; i < n; ++i) builder.node({{"mesh", mesh}, {"translation", {1.5 * i, 0, 0}}});
+}
+
 std::vector<Thing> things() {
   const auto nowhere = [](std::mt19937&, int, int) { return Json::object(); };
   const auto apart = [](std::mt19937&, int i, int n) -> Json {
@@ -256,7 +321,14 @@ std::vector<Thing> things() {
           {"primitives", addPrimitives},
           {"lights", addLights},
           {"trianglesOfADisc", addDisc},
-          {"verticesOfNoTriangle", addUnused}};
+          {"trianglesOfABook", addBook},
+          {"verticesOfNoTriangle", addUnused},
+          {"islandsInOnePlace", [](GltfBuilder& builder, int n) { addIslands(builder, n, true); }},
+          {"islandsInARow", [](GltfBuilder& builder, int n) { addIslands(builder, n, false); }},
+          {"morphTargets", addTargets},
+          {"joints", addJoints},
+          {"instances", addInstances},
+          {"shiningNodes", addLamps}};
 }
 
 class Growth : public testing::TestWithParam<Thing> {};

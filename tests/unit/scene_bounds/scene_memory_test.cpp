@@ -49,8 +49,22 @@ long peakKib() {
 }
 
 TEST(SceneMemory, HalfOfWhatThereIsIsTheLimitUnlessAnotherIsNamed) {
-  EXPECT_EQ(sceneMemoryLimit({}), memoryLimitBytes() / 2);
-  EXPECT_EQ(sceneMemoryLimit(withMemory(5)), 5U);
+  EXPECT_EQ(sceneMemoryLimit({}).bytes, memoryLimitBytes() / 2);
+  EXPECT_EQ(sceneMemoryLimit(withMemory(5)).bytes, 5U);
+}
+
+/// Who set no option must not be told what it allows.
+TEST(SceneMemory, TheLimitIsNamedByWhatItComesFrom) {
+  const auto fault = [](const SceneLimit& limit) {
+    return sceneMemoryFault(limit.bytes + kMib, limit, "its vertices");
+  };
+  EXPECT_EQ(fault(sceneMemoryLimit(withMemory(2048 * kMib))),
+            "with its vertices the scene would take 2.0 GiB or more; --max-scene-memory allows 2.0 GiB");
+  EXPECT_EQ(fault(likelySceneMemory({}, 8 * kMib)),
+            "with its vertices the scene would take 1.5 GiB or more; the limit is 1.5 GiB, for so few bytes of data, "
+            "unless --max-scene-memory names another");
+  EXPECT_THAT(fault(sceneMemoryLimit({})),
+              testing::EndsWith(", half of the memory there is, unless --max-scene-memory names another"));
 }
 
 TEST(SceneMemory, InstancesWithoutDataAreRefusedBeforeTheyAreMade) {
@@ -81,7 +95,7 @@ TEST(SceneMemory, MoreThanIsLikelyOfSoFewBytesIsRefusedUnlessALimitIsNamed) {
     const auto likely = claim({});
     EXPECT_EQ(likely.has_value(), count < 300'000);
     EXPECT_THAT(likely ? "" : likely.error().message,
-                testing::HasSubstr(count < 300'000 ? "" : "for so few bytes of data"));
+                testing::HasSubstr(count < 300'000 ? "" : "for so few bytes of data, unless --max-scene-memory"));
     EXPECT_TRUE(claim(withMemory(4096 * kMib)));
   }
 }
@@ -153,6 +167,38 @@ TEST(SceneMemory, EntriesOfListsCount) {
   builder.gltf["nodes"] = Json::array();
   for (int i = 0; i < 10'000; ++i) builder.gltf["nodes"].push_back(Json::object());
   expectRefused(builder.scene(withMemory(16 * kMib)), "/nodes");
+}
+
+/// A mebibyte of materials took 2.5 GiB, one of nodes that place nothing 1.2 GiB once somebody edited.
+TEST(SceneMemory, MoreEntriesThanAreLikelyAreRefusedBeforeTheyHaveDefaults) {
+  for (const std::string list : {"materials", "nodes"}) {
+    GltfBuilder builder;
+    builder.gltf[list] = Json::array();
+    for (int i = 0; i < 350'000; ++i) builder.gltf[list].push_back(Json::object());
+    const auto glb = builder.glb();
+    const auto before = peakKib();
+    const auto document = parseDocument("test.glb", glb);
+    ASSERT_FALSE(document);
+    EXPECT_EQ(document.error().code, ErrorCode::kTooLarge);
+    EXPECT_EQ(document.error().where, "test.glb: /" + list);
+    EXPECT_THAT(document.error().message, testing::HasSubstr("for so few bytes of data"));
+    EXPECT_LT(peakKib() - before, 128 * 1024);
+  }
+}
+
+TEST(SceneMemory, EntriesAndGeometryCountTogether) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.node({{"mesh", mesh}});
+  const auto document = builder.document();
+  ASSERT_TRUE(document);
+  const auto model = parseModel(*document);
+  ASSERT_TRUE(model);
+  const auto likely = likelySceneMemory({}, bytesOfData(*document)).bytes;
+  EXPECT_TRUE(claimOfGeometry(*document, *model, likely - kMib, {}));
+  const auto refused = claimOfGeometry(*document, *model, likely, {});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "test.glb: /meshes/" + std::to_string(mesh));
 }
 
 TEST(SceneMemory, AnEditThatClaimsTooMuchIsRefusedAndChangesNothing) {

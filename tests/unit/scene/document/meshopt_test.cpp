@@ -113,6 +113,19 @@ TEST(Meshopt, fallbackDataIsNotReadAndMayBeMissing) {
                 "which has 0: all its data is compressed, but not this");
 }
 
+TEST(Meshopt, fallbackDataThatNoViewNamesLeavesNothing) {
+  auto builder = MeshoptBuilder(kExt).mesh(Grid(3));
+  builder.extra_buffers.push_back({{"byteLength", 6},
+                                   {"uri", "data:application/octet-stream;base64,AAAAAAAA"},
+                                   {"extensions", {{kExt, {{"fallback", true}}}}}});
+  const auto document = builder.document();
+  ASSERT_TRUE(document) << document.error().text();
+  EXPECT_EQ(document->gltf.dump().find("base64"), std::string::npos) << "clients are sent this with each scene";
+  const auto again = parseDocument("again.glb", *writeGlb(*document));
+  ASSERT_TRUE(again) << again.error().text();
+  EXPECT_TRUE(importScene(*again));
+}
+
 TEST(Meshopt, plainViewsAndPicturesBesideItStay) {
   const Grid grid(3);
   auto builder = MeshoptBuilder(kExt).mesh(grid);
