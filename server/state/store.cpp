@@ -10,6 +10,7 @@
 
 #include "common/log.h"
 #include "common/sha256.h"
+#include "common/task.h"
 #include "server/state/store_rows.h"
 
 namespace radiosity::state {
@@ -122,6 +123,31 @@ std::string Store::digestOf(const Document& document) {
     for (const auto& bytes : *list) all += blobs_.idOf(bytes);
   }
   return sha256Hex(std::string_view(all));
+}
+
+std::shared_ptr<void> Store::writeAhead(const Document& document) {
+  if (!check()) return nullptr;
+  struct Held {
+    Blobs& blobs;
+    std::vector<std::string> ids = {};
+    explicit Held(Blobs& of) : blobs(of) {}
+    Held(const Held&) = delete;
+    Held& operator=(const Held&) = delete;
+    ~Held() {
+      for (const auto& id : ids) blobs.release(id);
+    }
+  };
+  auto held = std::make_shared<Held>(blobs_);
+  for (const auto* list : {&document.buffers, &document.images}) {
+    for (const auto& bytes : *list) {
+      interruptionPoint();
+      auto id = blobs_.idOf(bytes);
+      held->ids.reserve(held->ids.size() + 1);  // what is held is released
+      if (!blobs_.putAs(id, bytes)) return held;
+      held->ids.push_back(std::move(id));
+    }
+  }
+  return held;
 }
 
 Result<std::string> Store::putBlobs(const std::vector<SharedBytes>& blobs) {

@@ -102,6 +102,12 @@ class Store {
   /// Of JSON and bytes; whoever loads the same file has the same.
   [[nodiscard]] std::string digestOf(const Document& document);
 
+  /// Buffers and images of a scene that load() is to name, on the disk already: load() does not wait for the disk,
+  /// which takes a millisecond for each of them. They stay until this goes; null: none are. What cannot be written is
+  /// left to load(), which says why. Any thread; the store must be there as long. Interruption points between two of
+  /// them.
+  [[nodiscard]] std::shared_ptr<void> writeAhead(const Document& document);
+
   /// A scene was loaded: replaces document, revisions and edits.
   [[nodiscard]] Result<void> load(const Revision& revision, const Document& document, const std::string& digest);
 

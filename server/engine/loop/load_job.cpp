@@ -94,6 +94,7 @@ Result<std::unique_ptr<LitScene>> LoadJob::makeWhole(scene::Document document) {
   if (!whole) return whole;
   (void)(*whole)->startSolve();  // all that the solve thread need not do
   (*whole)->prepareUpload();
+  if (options_.keep_ahead) kept_ = options_.keep_ahead((*whole)->document());
   return whole;
 }
 

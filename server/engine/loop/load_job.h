@@ -36,6 +36,9 @@ class LoadJob {
     SolveSettings settings;
     std::uint64_t first_light_above = 0, first_texels = 0;  ///< as EngineOptions; 0 texels: no first light is wanted
     scene::ImportLimits limits = {};
+    /// Brings to the disk what need not wait until the load is told; what it returns is kept as long as the job. Empty:
+    /// nothing outlives the process.
+    std::function<std::shared_ptr<void>(const scene::Document&)> keep_ahead = {};
   };
 
   /// What has been made since the last take(). Every job that is not called off ends with either `known` or `whole`.
@@ -78,6 +81,7 @@ class LoadJob {
   std::mutex mutex_;
   std::condition_variable taken_;  ///< ready_ was
   Ready ready_;
+  std::shared_ptr<void> kept_;  ///< Options::keep_ahead()
   std::thread thread_;
 };
 

@@ -10,6 +10,7 @@
 
 #include "common/log.h"
 #include "server/engine/loop/solve_loop_class.h"
+#include "server/engine/persist/checkpoint_head.h"
 
 namespace radiosity::engine {
 namespace {
@@ -64,7 +65,11 @@ void SolveLoop::beginLoad(LoadJob::Request request) {
     runDeferred();
   };
   if (called_off_) return refuse(cancelled("the server is shutting down"));
-  const LoadJob::Options options{settings_, options_.first_light_above, lit_ ? 0 : options_.first_texels, limits_};
+  LoadJob::Options options{settings_, options_.first_light_above, lit_ ? 0 : options_.first_texels, limits_, {}};
+  if (options_.store)
+    options.keep_ahead = [store = options_.store](const auto& document) {
+      return store->writeAhead(plainDocument(document));
+    };
   const auto wake = [this] { queue_.wake(); };
   try {
     load_ = std::make_unique<LoadJob>(std::move(request), options, *transport_, wake, std::move(former_load_));

@@ -140,6 +140,31 @@ TEST_F(StoreTest, ForgottenEditsAndDroppedUploadsAreGoneAndSoAreTheirBytes) {
   EXPECT_EQ(blobs, 3U);  // vertices, picture, the second upload
 }
 
+TEST_F(StoreTest, WhatIsWrittenAheadStaysUntilItsLoadNamesIt) {
+  const auto store = open();
+  const Document next{"next.glb", "{}", {bytesOf("next vertices")}, {bytesOf("next picture"), bytesOf("another")}};
+  const auto lies = [&](std::string_view what) {
+    return std::filesystem::exists(folder_.file("state/blobs/" + sha256Hex(what)));
+  };
+  auto ahead = store->writeAhead(next);
+  ASSERT_TRUE(ahead);
+  for (const auto* what : {"next vertices", "next picture", "another"}) EXPECT_TRUE(lies(what)) << what;
+  ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));  // it sweeps what nothing names
+  EXPECT_TRUE(lies("next picture"));
+  ASSERT_TRUE(store->load(loadEntry(2), next, store->digestOf(next)));
+  ahead.reset();
+  EXPECT_TRUE(lies("next picture"));
+  ASSERT_TRUE(store->load(loadEntry(3), room(), "digest"));
+  EXPECT_FALSE(lies("next picture")) << "it is named no more";
+}
+
+TEST_F(StoreTest, NothingIsWrittenAheadWhereTheFolderIsGone) {
+  const auto store = open();
+  std::filesystem::rename(folder_.file("state"), folder_.file("elsewhere"));
+  EXPECT_FALSE(store->writeAhead(room()));
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("state")));
+}
+
 TEST_F(StoreTest, WhatForgottenEditsHadAppendedDoesNotAddUp) {
   constexpr std::uint64_t kEdits = 1000;
   auto store = open();
