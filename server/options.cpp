@@ -46,7 +46,8 @@ Result<std::string> readToken(const std::string& path) {
 
 void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--error", o.solve.target_error,
-                 "Stop when the estimated relative RMS error of irradiance is this small (0.02 = 2 %)")
+                 "Stop when light is this far off where people look, relative RMS (0.02 = 2 %); with texels of one "
+                 "size: on texels")
       ->check(CLI::Range(1e-9, 1.0))
       ->capture_default_str();
   app.add_option("--time-limit", raw.time_limit_s, "Stop after this many seconds of solving; 0: no limit")

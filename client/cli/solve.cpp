@@ -339,7 +339,10 @@ void addSolve(CLI::App& app, Run& run) {
   auto options = std::make_shared<SolveOptions>();
   auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
   addOutputOptions(command, *options);
-  command.add_option("--error", options->error, "target: relative RMS error of irradiance, 0.02 is 2 %")
+  command
+      .add_option(
+          "--error", options->error,
+          "target: relative RMS error of light where people look, 0.02 is 2 %; with texels of one size: on texels")
       ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("FRACTION")
       ->capture_default_str();

@@ -228,6 +228,7 @@ std::optional<bool> Hub::reached(const Waiter& waiter, const engine::Status& sta
   const bool good =
       chooses ? waiter.error && status.surface_error && status.error.total <= wanted : status.error.texels <= wanted;
   if (solved && good) return true;
+  if (chooses && waiter.error && status.probes_surface) return std::nullopt;  // it is being measured
   if (hasStopped(status.state)) return solved && !waiter.error && status.state == engine::SolveState::kConverged;
   return std::nullopt;
 }

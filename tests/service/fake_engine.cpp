@@ -144,6 +144,13 @@ void FakeEngine::announceLightmaps(engine::Quantity quantity) {
   for (const auto& listener : listeners()) listener->onLightmaps(now);
 }
 
+void FakeEngine::surface(std::optional<double> total) {
+  const std::lock_guard lock(mutex_);
+  status_.probes_surface = !total;
+  status_.surface_error.reset();
+  if (total) status_.surface_error = engine::SurfaceEstimate{*total, 0.0, 3.0 * *total};
+}
+
 void FakeEngine::progress(double error, engine::SolveState state) {
   {
     const std::lock_guard lock(mutex_);

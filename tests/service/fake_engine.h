@@ -30,6 +30,8 @@ class FakeEngine : public engine::Engine {
   std::uint64_t publishTile(std::uint32_t page, std::uint32_t tile);
   void changeLayout(Layout layout);
   void progress(double error, engine::SolveState state = engine::SolveState::kSolving);
+  /// What is measured at the surface; nothing: it is under way. Told with the next progress().
+  void surface(std::optional<double> total);
   /// Callbacks are kept until release().
   void holdAnswers();
   void release();

@@ -27,7 +27,8 @@ constexpr double kMuchOnBacks = 0.05, kNothing = 1e-12;
 constexpr double kMargin = 1.1;
 constexpr const char* kOnSingle = "on backs of single-sided faces";
 constexpr const char* kOnDark = "on sides of double-sided faces that were taken for dark";
-constexpr const char* kLookCloser = "with more texels (--texels) such sides are searched for light from more places";
+constexpr const char* kLookCloser =
+    "with more texels (--uniform --texels N) such sides are searched for light from more places";
 constexpr const char* kTurnRound =
     "where a room's faces are turned outward, --double-sided (doubleSided of solve.configure) lights both sides";
 

@@ -61,7 +61,6 @@ Result<std::unique_ptr<LitScene>> LitScene::build(scene::EditedDocument edited, 
   if (former != nullptr) {
     lit->layout_ = former->layout_;
     lit->draft_error_ = former->draft_error_;
-    lit->closer_ = former->closer_;
   } else {
     lit->setLayout(std::move(layout));
   }
@@ -255,7 +254,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
 
 void LitScene::restart(const SolveSettings& settings) {
   settings_ = settings;
-  old_error_ = 1.0;
+  old_error_ = closer_ = 1.0;
   if (stale_) materials_ = scene::shadePatches(*scene_, *patches_);
   makeSolver();
   stale_ = false;
@@ -284,7 +283,7 @@ std::shared_ptr<const scene::Document> LitScene::reshade(scene::Document documen
                                                          const SceneChange& change) {
   auto before = std::exchange(document_, std::make_shared<const scene::Document>(std::move(document)));
   scene_ = std::move(next);
-  old_error_ = 1.0;
+  old_error_ = closer_ = 1.0;
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
     const std::string place = "/materials/" + std::to_string(material) + " ";  // what was said of its former self
@@ -417,7 +416,7 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
 bool LitScene::setSky(const SolveSettings& settings) {
   settings_ = settings;
   if (sources_ == lightSources(*scene_)) return false;
-  old_error_ = 1.0;
+  old_error_ = closer_ = 1.0;
   const bool was_stale = std::exchange(stale_, true);
   if (!was_stale) updateSolver(false, true);
   stale_ = was_stale;

@@ -140,6 +140,7 @@ class LitScene {
 
   /// Another target or time limit: the solve goes on from where it is.
   void retarget(const SolveSettings& settings) {
+    if (settings.target_error != settings_.target_error) closer_ = 1.0;
     settings_ = settings;
     solver_->setTargetError(solverTarget(settings_, draft_error_, closer_));
   }
@@ -168,6 +169,7 @@ class LitScene {
   }
   /// From here on the solver's own light is shown, as good as it is.
   void endFade() {
+    old_error_ = 1.0;
     former_light_.reset();
     old_light_.clear();
     old_direct_.clear();
@@ -205,8 +207,9 @@ class LitScene {
   /// False: it is at that already. `share`: of what the solver leaves now, what it may leave.
   [[nodiscard]] bool solveCloser(double share) {
     if (closer_ <= kClosest) return false;
-    setCloser(std::max(kClosest, closer_ * share));
-    retarget(settings_);
+    const double now = solver_->error().total / solverTarget(settings_, draft_error_, 1.0);
+    closer_ = std::max(kClosest, std::min(closer_, now) * share);
+    solver_->setTargetError(solverTarget(settings_, draft_error_, closer_));
     return true;
   }
   /// All such shares together; before startSolve().

@@ -2,6 +2,7 @@
 // is shown and edited. The solve thread owns the job; one that goes is called off, and its end is waited for.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -41,6 +42,10 @@ class RefineJob {
   /// That it took; when it is done.
   [[nodiscard]] double seconds() const { return seconds_; }
   [[nodiscard]] bool isDone() const;
+  /// Since it began.
+  [[nodiscard]] double secondsSoFar() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  }
 
  private:
   void run();
@@ -53,6 +58,7 @@ class RefineJob {
   mutable std::mutex mutex_;
   std::optional<Made> made_;
   double seconds_ = 0.0;
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   std::thread thread_;
 };
 

@@ -132,7 +132,8 @@ bool SolveLoop::runCommands() {
 
 bool SolveLoop::hasNothingToDo() const {
   if (first_light_) return !first_light_->goes_on;
-  if (state_ == SolveState::kSolving) return refinement_ && refinement_->job && !refinement_->job->isDone();
+  if (state_ == SolveState::kSolving)
+    return refinement_ && refinement_->job && !refinement_->job->isDone() && !isOutOfTime();
   return !isBehind() && !probesSurface();
 }
 
@@ -171,8 +172,8 @@ void SolveLoop::takeTurn() {
       lit_->giveUpSurface();
       return updateStatus(true);
     }
-    if (refinement_ && refined_times_ < kMostLayouts) return giveUpTexels("out of memory");
-    if (refinement_) return endRefinement(refinement_->otherwise, refinement_->why);
+    if (refinement_) return endWithoutMemory();
+    if (std::exchange(coarser_, nullptr)) return log::warn("out of memory: the light of coarser texels is forgotten");
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
@@ -210,7 +211,7 @@ void SolveLoop::solveSlice() {
   if (*outcome == solver::StepOutcome::kSlice) {
     if (out_of_time && seconds_ >= *settings_.time_limit_s + kLimitGrace) {
       unpublished_ = true;
-      return endSolve(SolveState::kTimeLimit);
+      return stopInTime();
     }
     if (out_of_time) lit_->solver().endWave();
     if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
@@ -231,7 +232,7 @@ void SolveLoop::solveSlice() {
     chooses ? beginRefinement(SolveState::kLimited, std::move(why))
             : endRefinement(SolveState::kLimited, std::move(why));
   } else if (out_of_time) {
-    endSolve(SolveState::kTimeLimit);
+    stopInTime();
   } else {
     if (owes_pages_ || Clock::now() >= next_publish_) publishLightmaps(false);
     tellProgress(true);
@@ -266,7 +267,11 @@ void SolveLoop::catchUp() {
   tellLosses();
   if (outcome && *outcome == solver::StepOutcome::kSlice) return;
   unpublished_ = true;
-  if (outcome && *outcome == solver::StepOutcome::kConverged) return endSolve(SolveState::kConverged);
+  if (outcome && *outcome == solver::StepOutcome::kConverged) {
+    if (!settings_.choosesTexels()) return endSolve(SolveState::kConverged);
+    state_ = SolveState::kSolving;  // until it is measured again
+    return beginRefinement(SolveState::kConverged, {});
+  }
   // With all links it is not solved after all, or no renderer is left: the next slice goes on, or finds out.
   if (!outcome) lit_->invalidate();
   state_ = SolveState::kSolving;

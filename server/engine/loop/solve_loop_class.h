@@ -140,10 +140,13 @@ class SolveLoop final : public Engine {
   void endRefinement(SolveState state, std::string why);
   void orderRefined(WantedTexels wanted);
   void giveUpTexels(const std::string& why);
+  void endWithoutMemory();
+  /// The time is up: where the light of coarser texels is better, that is what there is.
+  void stopInTime();
   void keepTexels();
   void takeRefined();
   void dropRefinement();
-  [[nodiscard]] bool isOutOfTime() const { return settings_.time_limit_s && seconds_ >= *settings_.time_limit_s; }
+  [[nodiscard]] bool isOutOfTime() const;
   /// Layouts after one another: each of the first few halves what is missing, about.
   static constexpr int kMostLayouts = 4;
   /// Of measuring what people see, between two looks at what else there is to do.
@@ -205,9 +208,10 @@ class SolveLoop final : public Engine {
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it, once
-  /// `keep` has succeeded; but for one that is to be solved anew, with another seed say. A resumed one has its solve
+  /// `keep` has succeeded; but for one that is to be solved anew, with another seed say, or on finer
+  /// texels, beside which the present one stays (coarser_). A resumed one has its solve
   /// already. Returns what an edit touched.
-  enum class Relation { kOther, kEdited, kSolvedAnew, kResumed };
+  enum class Relation { kOther, kEdited, kSolvedAnew, kRefined, kResumed };
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
   /// `upload`: kBegun: renderers take it in already; kNever: they take in another, which is to follow it.
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
@@ -327,6 +331,7 @@ class SolveLoop final : public Engine {
   std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
   Upkeep upkeep_;
   std::optional<Refinement> refinement_;  // of the solve under way
+  std::unique_ptr<LitScene> coarser_;     // measured, and better than what is solved for yet; null: that is better
   int refined_times_ = 0;                 // since the scene was loaded or edited
   std::size_t lost_told_ = 0;             // warnings of lost light that were logged since the load: edits log no others
 

@@ -13,10 +13,11 @@ namespace radiosity::engine {
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                               const KeepMade& keep, Upload upload) {
   if (!made) return tl::unexpected<Error>(made.error());
-  auto* former = relation == Relation::kEdited || relation == Relation::kSolvedAnew ? lit_.get() : nullptr;
+  const bool is_anew = relation == Relation::kSolvedAnew || relation == Relation::kRefined;
+  auto* former = relation == Relation::kEdited || is_anew ? lit_.get() : nullptr;
   // What a solve that failed has measured may be a part of what it thinks it has.
   const bool is_whole = state_ != SolveState::kFailed && !(lit_ && lit_->isStale());
-  auto* measured = is_whole && relation != Relation::kSolvedAnew ? former : nullptr;
+  auto* measured = is_whole && !is_anew ? former : nullptr;
   const bool starts = relation != Relation::kResumed;
   bool keeps_layout = false;
   auto affected =
@@ -30,7 +31,8 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   renderer_lost_ = renderer_lost_ && upload == Upload::kNever;  // or else it took the scene
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
   disposer_.dispose(std::exchange(former_, nullptr));
-  disposer_.dispose(std::exchange(lit_, std::move(*made)));
+  auto before = std::exchange(lit_, std::move(*made));
+  disposer_.dispose(relation == Relation::kRefined ? std::exchange(coarser_, std::move(before)) : std::move(before));
   return affected;
 }
 

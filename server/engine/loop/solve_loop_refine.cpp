@@ -39,6 +39,7 @@ double inTwoDigits(double value) {
 }  // namespace
 
 void SolveLoop::beginRefinement(SolveState otherwise, std::string why) {
+  disposer_.dispose(std::exchange(coarser_, nullptr));
   refinement_.emplace(Refinement{otherwise, std::move(why), nullptr});
   publishLightmaps(false);
   tellProgress(true);
@@ -46,11 +47,16 @@ void SolveLoop::beginRefinement(SolveState otherwise, std::string why) {
 
 void SolveLoop::refineSlice() {
   const auto begin = Clock::now();
+  if (refinement_->job && !refinement_->job->isDone() && isOutOfTime())
+    return endRefinement(SolveState::kTimeLimit, {});
   if (refinement_->job) {
     takeRefined();
   } else {
     lit_->probeSurface(kProbeSeconds);
-    if (!lit_->lacksSurface()) judgeTexels();
+    if (!lit_->lacksSurface()) {
+      updateStatus(true);  // who waits for no more than this goes on
+      judgeTexels();
+    }
   }
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
@@ -62,7 +68,7 @@ void SolveLoop::judgeTexels() {
   if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
-  const bool is_worthwhile = wanted.error <= kWorthwhile * wanted.present;
+  const bool is_worthwhile = wanted.present > 0.0 && wanted.error <= kWorthwhile * wanted.present;
   if (lit_->isDraft() && (!is_worthwhile || wanted.present < kFineEnough * settings_.target_error)) return keepTexels();
   const bool can_solve = refinement_->otherwise != SolveState::kLimited && !lit_->isDraft();
   const double fine = refined_times_ < kMostLayouts && is_worthwhile ? kFineEnough : 1.0;
@@ -107,6 +113,18 @@ void SolveLoop::giveUpTexels(const std::string& why) {
   keepTexels();
 }
 
+/// There is none to measure with, or to lay texels out in. Does not throw: what takes it calls this.
+void SolveLoop::endWithoutMemory() {
+  if (refined_times_ < kMostLayouts && fitsMemory([&] { giveUpTexels("out of memory"); })) return;
+  refinement_.reset();
+  refined_times_ = kMostLayouts;
+  const bool told = fitsMemory([&] {
+    failure_ = "there is no memory to measure what is left at the surface";
+    endSolve(SolveState::kLimited);
+  });
+  if (!told) state_ = SolveState::kLimited;
+}
+
 /// None take their place: light is solved for as well as was asked for on those that there are.
 void SolveLoop::keepTexels() {
   dropRefinement();
@@ -119,12 +137,12 @@ void SolveLoop::takeRefined() {
   auto made = refinement_->job->take();
   if (!made) return;
   seconds_ += refinement_->job->seconds();
-  if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   const auto& measured = lit_->surfaceError();
   const double shown = measured ? measured->total : 1.0;
   dropRefinement();
+  if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   ++refined_times_;
-  const auto lit = relight(std::move(*made), Relation::kSolvedAnew, {}, uploadOfEdit());
+  const auto lit = relight(std::move(*made), Relation::kRefined, {}, uploadOfEdit());
   if (!lit) {
     if (state_ == SolveState::kFailed && lit.error().code == ErrorCode::kUnavailable) {
       state_ = SolveState::kSolving;
@@ -146,6 +164,21 @@ void SolveLoop::dropRefinement() {
     disposer_.dispose(std::move(refinement_->job));
   }
   refinement_.reset();
+  disposer_.dispose(std::exchange(coarser_, nullptr));
+}
+
+bool SolveLoop::isOutOfTime() const {
+  const double laying_out = refinement_ && refinement_->job ? refinement_->job->secondsSoFar() : 0.0;
+  return settings_.time_limit_s && seconds_ + laying_out >= *settings_.time_limit_s;
+}
+
+void SolveLoop::stopInTime() {
+  if (coarser_ && coarser_->surfaceError() && lit_->solver().error().total > coarser_->surfaceError()->total) {
+    const auto back = relight(std::move(coarser_), Relation::kResumed);
+    if (!back) log::warn("the light of coarser texels, which is better, cannot be had: {}", back.error().text());
+  }
+  dropRefinement();
+  endSolve(SolveState::kTimeLimit);
 }
 
 }  // namespace radiosity::engine

@@ -148,6 +148,7 @@ Result<void> SolveLoop::lightKept(const scene::Document& document) {
   auto other = settings_;
   other.texels = options_.settings.texels;
   other.texel_size_m = options_.settings.texel_size_m;
+  if (other.texels == options_.settings.usualTexels()) other.texels = other.usualTexels();
   if (!lit && lit.error().code == ErrorCode::kTooLarge && keptSettings(other) != keptSettings(settings_)) {
     log::warn("the kept number of texels cannot be lit, that of the command line holds: {}", lit.error().text());
     lit = light(other);
@@ -178,8 +179,9 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, head.layout, limits_);
   if (!lit) return lit;
   (*lit)->setDraft(head.draft_error);
-  (*lit)->setCloser(head.closer);
-  refined_times_ = static_cast<int>(std::min<std::uint32_t>(head.layouts, kMostLayouts));
+  const bool is_same = is_newest && settings_.target_error == head.target_error;
+  if (is_same) (*lit)->setCloser(head.closer);  // else texels are to follow what has changed
+  refined_times_ = is_same ? static_cast<int>(std::min<std::uint32_t>(head.layouts, kMostLayouts)) : 0;
   (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since

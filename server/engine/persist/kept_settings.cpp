@@ -54,6 +54,8 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
                        const std::set<std::string>& named) {
   const auto real = [&](const char* name) { return numberIn<double>(kept, name); };
   const auto whole = [&](const char* name) { return numberIn<std::uint64_t>(kept, name); };
+  const auto method = kept.contains("method") ? methodFrom(kept.at("method")) : std::nullopt;
+  const bool kept_adaptive = whole("adaptive").value_or(0) == 1;
   if (!named.contains("targetError")) {
     if (const auto error = real("targetError"); error && *error > 0.0 && *error <= 1.0) settings.target_error = *error;
   }
@@ -66,12 +68,14 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
     if (const auto size = real("texelSize"); size && *size >= 0.0 && std::isfinite(*size))
       settings.texel_size_m = *size;
   }
-  if (!named.contains("adaptive")) settings.adaptive = whole("adaptive").value_or(0) == 1;
+  if (!named.contains("adaptive")) settings.adaptive = kept_adaptive;
   if (!named.contains("seed")) settings.seed = whole("seed").value_or(settings.seed);
   if (const auto sky = kept.find("sky"); sky != kept.end() && !named.contains("sky")) settings.sky = skyIn(sky->second);
   if (!named.contains("doubleSided")) settings.double_sided = whole("doubleSided").value_or(0) == 1;
-  if (const auto method = kept.find("method"); method != kept.end() && !named.contains("method"))
-    settings.method = methodFrom(method->second).value_or(settings.method);
+  if (!named.contains("method")) settings.method = method.value_or(settings.method);
+  // As many as usual were not chosen: a million texels alike would take paper mode hours.
+  const bool chose = choosesTexels(kept_adaptive, real("texelSize").value_or(0.0), method.value_or(Method::kGather));
+  if (!named.contains("texels") && settings.texels == usualTexels(chose)) settings.texels = settings.usualTexels();
   return settings;
 }
 

@@ -93,6 +93,10 @@ SurfaceErrorParts SurfaceError::stated() const {
     light += glm::dot(true_[i][0], true_[i][1]);
     mean += channelMean(true_[i][0] + true_[i][1]) / 2.0 / count;
   }
+  if (!std::isfinite(wrong)) {  // lookups find what is no number
+    parts.total = parts.p95 = 1.0;
+    return parts;
+  }
   if (!(light > 0.0)) {  // what lookups find is all wrong
     parts.total = parts.p95 = std::ranges::any_of(found_, [](const glm::vec3& at) { return at != glm::vec3(0.0F); });
     return parts;

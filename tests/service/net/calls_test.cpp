@@ -140,6 +140,44 @@ TEST_F(CallsTest, AWaitThatIsOverLeavesNoTimerBehind) {
   EXPECT_TRUE(peer->timers.empty()) << "given up";
 }
 
+TEST_F(CallsTest, WhereTexelsAreChosenAWaitIsForWhatIsMeasured) {
+  hello();
+  engine.configure(
+      [](engine::SolveSettings settings) {
+        settings.adaptive = true;
+        return settings;
+      },
+      [](const auto&) {});
+  const auto answers = [&] { return peer->sent().size(); };
+  engine.surface(std::nullopt);
+  engine.progress(0.01);
+  const auto before = answers();
+  calls.handle(R"({"jsonrpc":"2.0","id":"w","method":"solve.wait","params":{"error":0.05}})");
+  engine.progress(0.01, engine::SolveState::kTimeLimit);
+  EXPECT_EQ(answers(), before) << "it is being measured";
+  engine.surface(0.03);
+  engine.progress(0.03, engine::SolveState::kTimeLimit);
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("reached":true)"));
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("p95":0.09)"));
+  engine.surface(0.07);
+  engine.progress(0.07, engine::SolveState::kTimeLimit);
+  calls.handle(R"({"jsonrpc":"2.0","id":"x","method":"solve.wait","params":{"error":0.05}})");
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("reached":false)"));
+}
+
+TEST(Merged, AsManyTexelsAsUsualAreAsManyAsAreUsualAfterwards) {
+  engine::SolveSettings chosen;
+  chosen.adaptive = true;
+  chosen.texels = kMostTexels;
+  const auto after = [&](protocol::SolveConfigureCall call) { return net::merged(chosen, call).texels; };
+  EXPECT_EQ(after({.adaptive = false}), kTexels);
+  EXPECT_EQ(after({.method = Method::kPaper}), kTexels);
+  EXPECT_EQ(after({.target_error = 0.1}), kMostTexels);
+  EXPECT_EQ(after({.texels = 500, .adaptive = false}), 500U);
+  chosen.texels = 700;
+  EXPECT_EQ(after({.adaptive = false}), 700U);
+}
+
 // The answer to hello is followed by another client's edit as closely as can be: from another thread, which is given
 // time to get through.
 TEST_F(CallsTest, AnEditThatComesBetweenTheAnswerToHelloAndTheFirstBroadcastReachesTheClientOnceAndInOrder) {

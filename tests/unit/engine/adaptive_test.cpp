@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <limits>
 #include <thread>
 
 #include "tests/scenes/scenes.h"
@@ -151,6 +152,25 @@ TEST_F(Adaptive, AnotherTargetWhileTexelsAreChosenIsTheOneThatHolds) {
   ASSERT_TRUE(eventually([&] { return status().state != SolveState::kSolving && status().surface_error; }));
   EXPECT_EQ(status().settings.target_error, kEasy);
   EXPECT_EQ(status().state, SolveState::kConverged);
+}
+
+// A layout that is young when the time is up must not take the place of one that was better.
+TEST_F(Adaptive, MoreTimeIsNeverWorse) {
+  constexpr double kMeasured = 1.3;  // two measures of one error differ by a tenth or so
+  double before = std::numeric_limits<double>::infinity();
+  for (const double limit : {0.05, 0.1, 0.2, 0.4, 0.8}) {
+    ASSERT_TRUE(configure([&](SolveSettings& settings) {
+      settings.adaptive = true;
+      settings.texels = 100'000;
+      settings.target_error = 0.002;
+      settings.time_limit_s = limit;
+    }));
+    ASSERT_TRUE(load(lumpedCube(0.5)));
+    ASSERT_TRUE(isMeasured());
+    EXPECT_LE(status().error.total, kMeasured * before) << limit << " s";
+    EXPECT_EQ(status().error.total, status().surface_error->total);
+    before = status().error.total;
+  }
 }
 
 }  // namespace

@@ -189,7 +189,11 @@ export class SolvePanel {
     if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
     this.chosen.checked = this.settings.adaptive;
     const [label] = this.texels.labels ?? [];
-    if (label) label.textContent = this.settings.adaptive ? 'Texels, at most' : 'Texels, approx.';
+    if (label)
+      label.textContent =
+        this.settings.adaptive && this.settings.texelSize <= 0 && this.settings.method !== 'paper'
+          ? 'Texels, at most'
+          : 'Texels, approx.';
     this.bothSides.checked = this.settings.doubleSided;
     this.method.value = this.settings.method;
   }
