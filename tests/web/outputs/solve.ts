@@ -25,9 +25,9 @@ export function folder(): string {
   return path;
 }
 
-/** Status 3, ended above the asked error, is as good as 0: output was written. Returns what was said. */
+/** Texels are of one size. Status 3, ended above the asked error, is as good as 0: output was written. Returns what was said. */
 export async function solve(scene: string, output: string, ...options: string[]): Promise<string> {
-  const args = ['solve', scene, '-o', output, ...options];
+  const args = ['solve', scene, '-o', output, '--uniform', ...options];
   return run(named('RADIOSITY'), args, { maxBuffer: 1 << 24 }).then(
     ({ stderr }) => stderr,
     (failure: { code?: number; stderr?: string; message: string }) => {
