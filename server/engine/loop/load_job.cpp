@@ -92,7 +92,7 @@ Result<std::unique_ptr<LitScene>> LoadJob::makeWhole(scene::Document document) {
   beginStage(1.0);
   auto whole = LitScene::make(std::move(*edited), options_.settings, transport_);
   if (!whole) return whole;
-  (void)(*whole)->startSolve();  // all that the solve thread need not do
+  (*whole)->prepareSolve();  // all that the solve thread need not do
   (*whole)->prepareUpload();
   if (options_.keep_ahead) kept_ = options_.keep_ahead((*whole)->document());
   return whole;

@@ -38,7 +38,7 @@ void RefineJob::run() {
     auto lit = layOut();
     if (!lit) return lit;
     (*lit)->setDraft(order_.draft_error);
-    (void)(*lit)->startSolve();  // all that the solve thread need not do
+    (*lit)->prepareSolve();  // all that the solve thread need not do
     (*lit)->prepareUpload();
     return lit;
   });
