@@ -91,13 +91,14 @@ std::string statusText(const protocol::StatusReply& status) {
   const auto loaded = p.fraction ? fmt::format(", {:.0f} % done", 100.0 * *p.fraction) : std::string();
   row("state", stateWord(p.state) + loaded + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
-  row("error",
-      !p.unlit.empty()
-          ? unlitText(p)
-          : fmt::format("{} of {}{} (texels {}: residual {}, sampling {}, variation {}; between them {})",
-                        percentText(p.error.total), percentText(s.target_error), p95Text(p.error),
-                        percentText(p.error.texels), percentText(p.error.residual), percentText(p.error.sampling),
-                        percentText(p.error.variation), percentText(p.error.discretization)));
+  const auto target = " of " + percentText(s.target_error);  // of what it is a target for
+  row("error", !p.unlit.empty()
+                   ? unlitText(p)
+                   : fmt::format("{}{}{} (texels {}{}: residual {}, sampling {}, variation {}; between them {})",
+                                 percentText(p.error.total), s.choosesTexels() ? target : "", p95Text(p.error),
+                                 percentText(p.error.texels), s.choosesTexels() ? "" : target,
+                                 percentText(p.error.residual), percentText(p.error.sampling),
+                                 percentText(p.error.variation), percentText(p.error.discretization)));
   row("shots", fmt::format("{}, {:.0f}/s", countText(p.shots), p.shots_per_second));
   row("time", durationText(p.seconds) + (p.seconds_left ? ", " + durationText(*p.seconds_left) + " left" : "") +
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));

@@ -67,9 +67,12 @@ std::string statusPage(const engine::Status& s, std::size_t viewers, std::string
                                          : fmt::format("{}: {}", stateName(s.state), s.failure));
   if (!s.state_trouble.empty()) page += row("Edits are refused", printable(s.state_trouble));
   page += row("Scene revision", std::to_string(s.revision));
-  page += row("Estimated error", s.unlit.empty() ? fmt::format("{:.2f} % (target {:.2f} %)", 100 * s.error.total,
-                                                               100 * s.settings.target_error)
+  const auto target = fmt::format(" (target {:.2f} %)", 100 * s.settings.target_error);
+  const bool chooses = s.settings.choosesTexels();
+  page += row("Estimated error", s.unlit.empty() ? fmt::format("{:.2f} %{}", 100 * s.error.total, chooses ? target : "")
                                                  : "no light arrives: " + s.unlit);
+  if (!chooses && s.unlit.empty())
+    page += row("Of texels alone", fmt::format("{:.2f} %{}", 100 * s.error.texels, target));
   page += row("Solve time", fmt::format("{:.2f} s", s.seconds));
   if (s.seconds_left) page += row("Time left, about", fmt::format("{:.0f} s", *s.seconds_left));
   page += row("Shots", fmt::format("{} ({:.0f} a second)", s.shots, s.shots_per_second));

@@ -31,7 +31,10 @@ Result<void> Blobs::prepare() const {
 
 void Blobs::remember(const SharedBytes& bytes, const std::string& id, bool written) {
   const std::scoped_lock lock(mutex_);
-  std::erase_if(known_, [](const auto& entry) { return entry.second.bytes.expired(); });
+  if (known_.size() >= looked_through_at_) {  // now and then: a scene may have tens of thousands
+    std::erase_if(known_, [](const auto& entry) { return entry.second.bytes.expired(); });
+    looked_through_at_ = 2 * known_.size() + 16;
+  }
   known_[bytes.get()] = {bytes, id, written};
 }
 

@@ -50,7 +50,8 @@ class Blobs {
     std::string id;
     bool written = false;
   };
-  std::map<const Bytes*, Known> known_;
+  std::map<const Bytes*, Known> known_;  ///< those that are gone, too, until it has so many entries
+  std::size_t looked_through_at_ = 0;
   std::multiset<std::string> held_;  ///< written, not yet named by anything
 };
 

@@ -138,11 +138,11 @@ std::shared_ptr<void> Store::writeAhead(const Document& document) {
     }
   };
   auto held = std::make_shared<Held>(blobs_);
+  held->ids.reserve(document.buffers.size() + document.images.size());  // what is held is released
   for (const auto* list : {&document.buffers, &document.images}) {
     for (const auto& bytes : *list) {
       interruptionPoint();
       auto id = blobs_.idOf(bytes);
-      held->ids.reserve(held->ids.size() + 1);  // what is held is released
       if (!blobs_.putAs(id, bytes)) return held;
       held->ids.push_back(std::move(id));
     }

@@ -145,7 +145,8 @@ class SolveLoop final : public Engine {
   void stopInTime();
   void keepTexels();
   void takeRefined();
-  void dropRefinement();
+  void callOffRefinement();
+  void dropRefinement();  ///< and what it came from
   [[nodiscard]] bool isOutOfTime() const;
   /// Layouts after one another: each of the first few halves what is missing, about.
   static constexpr int kMostLayouts = 4;

@@ -311,7 +311,7 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool reshaped, bool an
     (void)fitsMemory([&] { lit_->restart(settings_); });
     return beginSolve();
   }
-  dropRefinement();  // it was for the settings before
+  callOffRefinement();  // it was for the settings before
   refined_times_ = 0;
   lit_->retarget(settings_);
   bool other_light = before.sky != settings_.sky;
@@ -333,8 +333,9 @@ void SolveLoop::reconsiderStop() {
                                                  : lit_->solver().error().total <= settings_.target_error;
   if (state_ == SolveState::kLimited && !reached && !settings_.choosesTexels()) return;
   failure_.clear();
-  const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
-  const SolveState now = reached ? SolveState::kConverged : out_of_time ? SolveState::kTimeLimit : SolveState::kSolving;
+  const SolveState now = reached         ? SolveState::kConverged
+                         : isOutOfTime() ? SolveState::kTimeLimit
+                                         : SolveState::kSolving;
   if (now == state_) return;
   if (now == SolveState::kSolving) {
     state_ = now;

@@ -65,7 +65,7 @@ void SolveLoop::refineSlice() {
 void SolveLoop::judgeTexels() {
   const double left = lit_->surfaceError()->total;
   if (left <= settings_.target_error) return endRefinement(SolveState::kConverged, {});
-  if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) return endRefinement(SolveState::kTimeLimit, {});
+  if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels();
   const auto texels = static_cast<double>(lit_->patchCount());
   const bool is_worthwhile = wanted.present > 0.0 && wanted.error <= kWorthwhile * wanted.present;
@@ -158,12 +158,16 @@ void SolveLoop::takeRefined() {
 }
 
 /// Nobody waits for what a thread is at that lays texels out.
-void SolveLoop::dropRefinement() {
+void SolveLoop::callOffRefinement() {
   if (refinement_ && refinement_->job) {
     refinement_->job->cancel();
     disposer_.dispose(std::move(refinement_->job));
   }
   refinement_.reset();
+}
+
+void SolveLoop::dropRefinement() {
+  callOffRefinement();
   disposer_.dispose(std::exchange(coarser_, nullptr));
 }
 

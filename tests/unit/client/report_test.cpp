@@ -66,7 +66,10 @@ TEST(StatusText, tellsStateErrorAndWarnings) {
   EXPECT_THAT(text, testing::HasSubstr("state      converged\n"));
   EXPECT_THAT(text,
               testing::HasSubstr(
-                  "1.8 % of 2 % (texels 1.75 %: residual 0.1 %, sampling 1.7 %, variation 0.3 %; between them 0.2 %)"));
+                  "1.8 % (texels 1.75 % of 2 %: residual 0.1 %, sampling 1.7 %, variation 0.3 %; between them 0.2 %)"));
+  auto chosen = someStatus();
+  chosen.settings.adaptive = true;
+  EXPECT_THAT(statusText(chosen), testing::HasSubstr("1.8 % of 2 % (texels 1.75 %: residual"));
   EXPECT_THAT(text, testing::HasSubstr("  3 triangles dropped\n"));
 }
 

@@ -42,11 +42,26 @@ export function stateText({ state, fraction }: Pick<Progress, 'state' | 'fractio
   return state !== 'loading' || fraction === undefined ? name : `${name}, ${Math.round(100 * fraction)} %`;
 }
 
+/** The error that the target is for. */
+export function aimedAt({ error }: Pick<Progress, 'error'>, settings: Settings | undefined): number {
+  return settings && choosesTexels(settings) ? error.total : error.texels;
+}
+
+/** Whether the server chooses texels: then the target is for what people see. */
+export function choosesTexels({ adaptive, texelSize, method }: Settings): boolean {
+  return adaptive && texelSize <= 0 && method !== 'paper';
+}
+
 /** Length of the bar in [0, 1]: towards the target error on a logarithmic scale, or towards the end of a load. */
-export function barValue(progress: Progress, firstError: number, target: number): number {
+export function barValue(
+  progress: Pick<Progress, 'state' | 'fraction'>,
+  error: number,
+  firstError: number,
+  target: number,
+): number {
   if (progress.state === 'converged') return 1;
   if (progress.state === 'loading') return progress.fraction ?? 0;
-  const way = Math.log(firstError / progress.error.total) / Math.log(firstError / target);
+  const way = Math.log(firstError / error) / Math.log(firstError / target);
   return Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
 }
 
@@ -119,8 +134,8 @@ export class SolvePanel {
     this.plot.add(progress);
     const states = [progress.state, this.progress?.state ?? ''];
     this.progress = progress;
-    if (progress.shots === 0 || progress.error.total > this.firstError)
-      this.firstError = Math.max(progress.error.total, 1e-6);
+    const error = aimedAt(progress, this.settings);
+    if (progress.shots === 0 || error > this.firstError) this.firstError = Math.max(error, 1e-6);
     if (states.every((state) => ITS_OWN.includes(state))) this.spaced.soon();
     else this.spaced.now();
   }
@@ -137,20 +152,19 @@ export class SolvePanel {
     if (!progress) return;
     const { error } = progress;
     const target = this.settings?.targetError ?? 0.02;
-    this.bar.value = barValue(progress, this.firstError, target);
+    const chosen = this.settings !== undefined && choosesTexels(this.settings);
+    const aim = ` (target ${percent(target)})`;
+    this.bar.value = barValue(progress, aimedAt(progress, this.settings), this.firstError, target);
     this.pause.textContent = progress.state === 'paused' ? 'Resume' : 'Pause';
     this.pause.disabled = progress.state !== 'paused' && progress.state !== 'solving';
     this.showFacts([
       ['State', progress.failure ? `${stateText(progress)}: ${progress.failure}` : stateText(progress)],
-      [
-        'Error',
-        progress.unlit ? `no light arrives: ${progress.unlit}` : `${percent(error.total)} (target ${percent(target)})`,
-      ],
+      ['Error', progress.unlit ? `no light arrives: ${progress.unlit}` : percent(error.total) + (chosen ? aim : '')],
       [
         '95 % of places within',
         error.p95 !== undefined ? percent(error.p95) : error.measuring ? 'being measured' : '–',
       ],
-      ['Texels alone', percent(error.texels)],
+      ['Texels alone', percent(error.texels) + (chosen ? '' : aim)],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
       ['Within texels', percent(error.variation ?? 0)],
@@ -189,11 +203,7 @@ export class SolvePanel {
     if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
     this.chosen.checked = this.settings.adaptive;
     const [label] = this.texels.labels ?? [];
-    if (label)
-      label.textContent =
-        this.settings.adaptive && this.settings.texelSize <= 0 && this.settings.method !== 'paper'
-          ? 'Texels, at most'
-          : 'Texels, approx.';
+    if (label) label.textContent = choosesTexels(this.settings) ? 'Texels, at most' : 'Texels, approx.';
     this.bothSides.checked = this.settings.doubleSided;
     this.method.value = this.settings.method;
   }
