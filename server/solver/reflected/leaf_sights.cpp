@@ -15,7 +15,9 @@ namespace radiosity::solver {
 namespace {
 
 /// Leaves between two looks at the clock, of all threads together, and of one at a time.
-constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
+constexpr std::uint32_t kLeavesASlice = 2048, kLeavesWithoutRoom = 64;
+/// Between two looks at the clock: among thousands of large thin boxes a ray takes 60 us, and a leaf has a hundred.
+constexpr std::uint32_t kLeavesAPart = 4;
 /// So many rays of each half at most tell whether a leaf lies in part inside of something. With 8 those were missed of
 /// which less than a tenth does, and that tenth kept its light from all rays that met the rest.
 constexpr std::size_t kLooks = 64;
@@ -71,6 +73,7 @@ void LeafSights::ask(std::span<const std::uint16_t> counts) {
 /// What is known moves to where it belongs, and steps that no ray has are dropped; before a half is laid out anew
 /// nothing is lost should memory run out.
 void LeafSights::layOut(std::span<const std::uint16_t> counts) {
+  slice_.reset();  // its rays that have steps are traced anew
   std::vector<std::uint16_t> count(leaf_count_, 0);
   std::vector<std::size_t> first(first_.size(), 0);
   std::size_t all = 0;
@@ -216,7 +219,7 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
 
 /// Where the slice that begins at cursor_ ends: before its rays, should all go on as often as rays may, would take more
 /// than there is room for. Where that is so of a single leaf no ray of some goes on.
-std::uint32_t LeafSights::beginSlice() {
+LeafSights::Slice LeafSights::beginSlice() {
   const auto steps = steps_[0].size() + steps_[1].size();
   const auto taken = bytes() + steps * step_bytes_;
   const auto roomBeside = [&](std::size_t bytes) {
@@ -235,27 +238,46 @@ std::uint32_t LeafSights::beginSlice() {
   }
   goes_on_ = end > cursor_;
   is_short_ = is_short_ || !goes_on_;
-  return goes_on_ ? end : std::min(leaf_count_, cursor_ + kLeavesAtOnce);
+  if (!goes_on_) end = std::min(leaf_count_, cursor_ + kLeavesWithoutRoom);
+  Slice slice{.end = end, .made = {}, .done = 0};
+  slice.made.resize((end - cursor_ + kLeavesAPart - 1) / kLeavesAPart);
+  return slice;
 }
 
-/// From cursor_ to `end`. Where memory runs out, rays with steps are as good as not traced.
-void LeafSights::traceSlice(std::uint32_t end) {
-  const auto parts = (end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce;
-  std::vector<std::array<NewSteps, 2>> made(parts);
+/// Goes on with a slice that begins at cursor_ until `end`, each thread by one part at least. Where memory runs out,
+/// rays with steps are as good as not traced, and the slice is to begin anew.
+void LeafSights::traceSlice(Slice slice, Clock::time_point end) {
+  const auto parts = slice.made.size();
+  std::atomic<std::size_t> next{slice.done};
   std::atomic<std::uint64_t> traced{0};
-  inTurns(parts, [&](std::size_t part) {
-    const auto from = cursor_ + static_cast<std::uint32_t>(part) * kLeavesAtOnce;
-    std::uint64_t rays = 0;
-    for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
-      if (count_[value] == 0) continue;
-      const Side& side = rays_->sideOf(value);
-      for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
-    }
-    traced += rays;
+  inShares(parts - slice.done, [&](std::size_t, std::size_t) {
+    do {
+      const auto part = next++;
+      if (part >= parts) return;
+      interruptionPoint();
+      traced += tracePart(slice, part);
+    } while (Clock::now() < end);
   });
-  takeSteps(made);
+  slice.done = std::min(parts, next.load());
   traced_ += traced;
-  cursor_ = end;
+  if (slice.done < parts) {
+    slice_ = std::move(slice);
+    return;
+  }
+  takeSteps(slice.made);
+  cursor_ = slice.end;
+}
+
+/// Returns how many rays.
+std::uint64_t LeafSights::tracePart(Slice& slice, std::size_t part) {
+  const auto from = cursor_ + static_cast<std::uint32_t>(part) * kLeavesAPart;
+  std::uint64_t rays = 0;
+  for (auto value = from; value < std::min(slice.end, from + kLeavesAPart); ++value) {
+    if (count_[value] == 0) continue;
+    const Side& side = rays_->sideOf(value);
+    for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, slice.made[part][half]);
+  }
+  return rays;
 }
 
 /// By the first rays of all.
@@ -284,6 +306,7 @@ std::vector<bool> LeafSights::findPartlyInside() const {
 void LeafSights::takePartlyInside() {
   auto found = findPartlyInside();
   if (found == partly_inside_) return;
+  slice_.reset();
   cursor_ = 0;  // whatever happens, what is given up below is traced before anyone asks for it
   std::vector<bool> differs(endCount(), false);
   for (std::uint32_t value = 0; value < leaf_count_; ++value)
@@ -321,12 +344,13 @@ std::size_t LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_
 }
 
 bool LeafSights::trace(double seconds) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  constexpr double kLongest = 1e6;  // what clocks can add
+  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                      std::chrono::duration<double>(std::min(seconds, kLongest)));
   while (cursor_ < leaf_count_) {
-    traceSlice(beginSlice());
+    traceSlice(slice_ ? *std::exchange(slice_, std::nullopt) : beginSlice(), end);
     if (isTraced()) takePartlyInside();
-    if (spent() >= seconds) break;
+    if (Clock::now() >= end) break;
   }
   if (!isTraced()) return false;
   for (auto& half : steps_) half.shrink_to_fit();  // they grew by doubling

@@ -9,8 +9,10 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -123,6 +125,7 @@ class LeafSights {
   [[nodiscard]] std::uint64_t kept() const { return kept_; }
 
  private:
+  using Clock = std::chrono::steady_clock;
   static constexpr std::uint32_t kUntraced = scene::kNone;
   /// Leaves of which it is known together where their rays begin.
   static constexpr std::uint32_t kLeavesAFirst = 16;
@@ -155,14 +158,21 @@ class LeafSights {
     std::vector<Step> steps;
     std::vector<Ray> rays;
   };
+  /// Leaves from cursor_ that are traced together: what room there is for their steps is looked at before.
+  struct Slice {
+    std::uint32_t end = 0;
+    std::vector<std::array<NewSteps, 2>> made;  ///< by part
+    std::size_t done = 0;                       ///< parts
+  };
   void layOut(std::span<const std::uint16_t> counts);
   /// Returns how many rays.
   std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made);
   [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, const glm::dvec3& direction, std::uint64_t key,
                                        const geometry::Hit& first, std::vector<Step>& steps) const;
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
-  [[nodiscard]] std::uint32_t beginSlice();
-  void traceSlice(std::uint32_t end);
+  [[nodiscard]] Slice beginSlice();
+  void traceSlice(Slice slice, Clock::time_point end);
+  std::uint64_t tracePart(Slice& slice, std::size_t part);
   [[nodiscard]] std::vector<bool> findPartlyInside() const;
   void takePartlyInside();
   std::size_t giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half);
@@ -209,6 +219,7 @@ class LeafSights {
   std::uint64_t seed_;
   std::uint32_t leaf_count_ = 0;
   std::uint32_t cursor_ = 0;                   ///< leaves below are traced
+  std::optional<Slice> slice_;                 ///< the one at cursor_, where some of it is traced
   std::vector<std::uint16_t> count_, before_;  ///< by leaf value; before what was asked for last
   std::vector<std::size_t> first_;             ///< by kLeavesAFirst leaf values: into seen_
   std::array<PackedNumbers, 2> seen_;          ///< the largest that fits: not traced

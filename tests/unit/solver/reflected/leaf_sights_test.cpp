@@ -115,7 +115,7 @@ TEST(LeafSights, AreTheSameHoweverTheyWereAskedForAndCut) {
     often.sights.ask(std::vector<std::uint16_t>(often.sights.leafCount(), count));
     int slices = 1;
     while (!often.sights.trace(0.0)) ++slices;  // a slice at a time
-    EXPECT_GE(slices, 1);
+    EXPECT_GT(slices, 1);
   }
   EXPECT_TRUE(same(once.sights, often.sights));
   EXPECT_EQ(once.sights.traced(), often.sights.traced());
@@ -131,7 +131,9 @@ TEST(LeafSights, ThatAreGivenUpLeaveThoseThatWere) {
   few.trace(2);
   cube.trace(2);
   cube.sights.ask(std::vector<std::uint16_t>(cube.sights.leafCount(), 16));
-  ASSERT_FALSE(cube.sights.trace(0.0));
+  const auto before = cube.sights.traced();
+  while (cube.sights.traced() < before + 2U * 14 * 2100)
+    ASSERT_FALSE(cube.sights.trace(0.0));  // all of a slice, some of the next
   cube.sights.giveUp();
   ASSERT_TRUE(cube.sights.trace(HUGE_VAL));
   EXPECT_EQ(cube.sights.counts().front(), 16U) << "it was its turn";
