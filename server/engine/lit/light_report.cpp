@@ -21,6 +21,8 @@ using scene::kNone;
 
 /// Lamps that are named, and surfaces of a room that is turned inside out; of more the number is told.
 constexpr std::size_t kMostNamed = 20, kMostSurfaces = 3;
+/// Lamps whose rays are followed after a solve: while they are, no edit is done, and 14,000 take 2 s.
+constexpr std::size_t kMostAsked = 1'000;
 /// Of the light that is sent: more on backs is told of. What does not arrive anywhere but for rounding.
 constexpr double kMuchOnBacks = 0.05, kNothing = 1e-12;
 /// Chance may make a lamp's light look stronger than what is lost, of which it is a part.
@@ -258,22 +260,27 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
     return *rays;
   };
   Names names(lost_, "light nothing");
+  std::size_t lamps_that_may = 0;
+  const auto mayBeLost = [&](double power) {
+    return power > 0.0 && power <= kMargin * lost && ++lamps_that_may <= kMostAsked;
+  };
   const Lamps lamps(parts);
   for (std::uint32_t i = 0; i < parts.scene.instances.size(); ++i) {
-    const double power = lamps.of(i).power;
-    if (!(power > 0.0) || power > kMargin * lost) continue;
+    if (!mayBeLost(lamps.of(i).power)) continue;
     const auto fate = ask().ofInstance(i);
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("lamp {} lights nothing: {}", nameOf(parts, i), endOf(parts, fate, false)); });
   }
   const auto powers = solver::fluxes(parts.patches, parts.sources);
   for (std::size_t i = 0; i < parts.sources.lights.size(); ++i) {
-    if (!(powers[i] > 0.0) || powers[i] > kMargin * lost) continue;
+    if (!mayBeLost(powers[i])) continue;
     const auto fate = ask().ofLight(parts.sources.lights[i]);
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("{} lights nothing: {}", lightName(parts, i), endOf(parts, fate, true)); });
   }
   names.finish();
+  if (lamps_that_may > kMostAsked)
+    lost_.push_back(fmt::format("whether {} more lamps light anything is not known", lamps_that_may - kMostAsked));
   if (on_backs > kMuchOnBacks * emitted)
     tellBacks(parts, ask().backs(solver.irradiance(), parts.sources), on_backs / emitted, lost_);
 }

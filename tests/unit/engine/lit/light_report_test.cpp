@@ -55,10 +55,10 @@ class LightOnBacks : public testing::Test {
     }
   }
   /// As if these materials were double-sided, and no light had been found on their backs.
-  std::vector<std::string> reportOf(const std::vector<std::size_t>& double_sided) {
+  std::vector<std::string> reportOf(const std::vector<std::size_t>& double_sided,
+                                    const solver::LightSources& sources = {}) {
     auto scene = lit_->scene();
     for (const auto m : double_sided) scene.materials[m].double_sided = true;
-    const solver::LightSources sources;
     engine::LightReport report;
     report.findLost({lit_->document(), scene, lit_->patches(), lit_->materials(), sources}, lit_->solver());
     return report.lost();
@@ -90,6 +90,22 @@ TEST_F(LightOnBacks, OfBothKindsEachIsToldItsOwn) {
                                    HasSubstr("'tiles'"), Not(HasSubstr("'sheets'")))));
   EXPECT_THAT(told, Contains(AllOf(HasSubstr("% of the light ends on sides of double-sided faces"),
                                    HasSubstr("'sheets'"), Not(HasSubstr("'tiles'")))));
+}
+
+TEST_F(LightOnBacks, OfManyLampsOnlySomeAreAsked) {
+  solver::LightSources sources;
+  scene::PunctualLight upward;
+  upward.kind = scene::LightKind::kSpot;
+  upward.position = {0.0, 10.0, 0.0};
+  upward.direction = {0.0, 1.0, 0.0};
+  upward.intensity = glm::vec3(1e-6F);
+  sources.lights.assign(998, upward);
+  // With the two lamps that face the floors' backs as many as are asked.
+  EXPECT_THAT(reportOf({}, sources), Contains(HasSubstr("980 more lamps light nothing")));
+  EXPECT_THAT(reportOf({}, sources), Not(Contains(HasSubstr("not known"))));
+  sources.lights.resize(1005, upward);
+  EXPECT_THAT(reportOf({}, sources), Contains(HasSubstr("980 more lamps light nothing")));
+  EXPECT_THAT(reportOf({}, sources), Contains(HasSubstr("whether 7 more lamps light anything is not known")));
 }
 
 }  // namespace
