@@ -143,6 +143,7 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
 TEST_F(ChairEdit, LooksPastWhatLittleIsLostElsewhere) {
   lookByImages();
   settings_.target_error = 0.1;
+  settings_.seed = 4;  // by the points of 1, 2 and 3 nothing is lost where the edit is seen
   const auto after = edited(before_, move_);
   const auto map = mapOf(before_, after);
   const auto first = solved(before_), second = solved(before_), third = solved(before_);

@@ -23,6 +23,13 @@ constexpr double kMostGrowth = 8.0;
 /// What is chosen for an error meets that up to rounding, unless texels would have to be finer than can be told.
 constexpr double kMet = 1.001;
 
+solver::TexelDetail chooseDetail(const scene::PatchScene& patches, const solver::Solver& solver,
+                                 std::span<const solver::SurfaceError::Measured> measured,
+                                 const solver::DetailGoal& goal) {
+  const auto first = solver.halfIrradiance(0), second = solver.halfIrradiance(1), common = solver.commonErrorSquared();
+  return solver::chooseDetail(patches, {first, second, common}, measured, goal);
+}
+
 }  // namespace
 
 std::uint64_t texelBudget(const SolveSettings& settings) {
@@ -38,8 +45,7 @@ WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver
                           std::span<const solver::SurfaceError::Measured> measured, const SolveSettings& settings,
                           std::uint64_t patch_count) {
   const double most = std::min(static_cast<double>(settings.texels), kMostGrowth * static_cast<double>(patch_count));
-  auto wanted = solver::chooseDetail(patches, solver.halfIrradiance(0), solver.halfIrradiance(1), measured,
-                                     {kTexelsPart * settings.target_error, most});
+  auto wanted = chooseDetail(patches, solver, measured, {kTexelsPart * settings.target_error, most});
   return {{std::move(wanted.of_surface), patches.scale * patches.texel, patches.scale * patches.rough_texel},
           wanted.error,
           wanted.present,
@@ -50,8 +56,7 @@ std::optional<double> enoughTexels(const scene::PatchScene& patches, const solve
                                    std::span<const solver::SurfaceError::Measured> measured,
                                    const SolveSettings& settings) {
   const double target = kTexelsPart * settings.target_error;
-  const auto wanted = solver::chooseDetail(patches, solver.halfIrradiance(0), solver.halfIrradiance(1), measured,
-                                           {target, std::numeric_limits<double>::max()});
+  const auto wanted = chooseDetail(patches, solver, measured, {target, std::numeric_limits<double>::max()});
   return wanted.error <= kMet * target ? std::optional(wanted.texels) : std::nullopt;
 }
 

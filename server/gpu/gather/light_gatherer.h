@@ -1,5 +1,8 @@
-// Direct light of a polygon at every leaf: exact form factor times visibility, which item buffers rendered from points
-// on the light decide. One thread.
+// Direct light of a polygon at every leaf: exact form factor times visibility, which rays to points on the light
+// decide, or item buffers rendered from these. One thread.
+//
+// By rays each receiver looks at points of its own, so that few of them make the edge of a shadow grainy, which is
+// smoothed away (DirectSmoothing); by item buffers all look at the same, which makes it stepped.
 //
 // A leaf is hidden from a light point only if it lies behind the plane of the triangle seen in its direction: no depth
 // bias, hence no acne, and light does not leak under blocks. At convex edges, where the pixel may belong to the surface
@@ -60,9 +63,11 @@ class LightGatherer {
     std::vector<std::uint32_t> doubtful;  ///< those with some
     std::vector<float> front;             ///< part of what shines that lies before the receiver's plane
     std::array<std::vector<float>, 2> weight, visible_weight;
-    std::vector<float> point_weight;   ///< of the point being tested
-    std::vector<std::uint32_t> pixel;  ///< in which it sees the receiver
-    std::vector<float> visibility;     ///< as findVisibility last found it
+    std::vector<float> point_weight;               ///< of the point being tested
+    std::vector<std::uint32_t> pixel;              ///< in which it sees the receiver
+    std::vector<std::uint32_t> turn;               ///< Receivers::turnOf
+    std::vector<float> light_x, light_y, light_z;  ///< the points that receivers look at, of their own
+    std::vector<float> visibility;                 ///< as findVisibility last found it
 
     void resize(std::size_t count);
   };
@@ -118,7 +123,8 @@ class LightGatherer {
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items, std::uint32_t resolution,
                  const HemicubeWeights& weights, Lost& lost);
   void beginSums();
-  void askRays(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::size_t half);
+  void askRays(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::uint32_t look,
+               std::size_t half);
   void loseByRays(const solver::HemicubeFrame& point, Lost& lost) const;
   void deliverSums(const solver::GatherShot& shot, std::size_t points, const std::array<Lost, 2>& lost,
                    double flux_scale, const FluxSink& sink, solver::TransportCounters& counters);

@@ -71,8 +71,10 @@ RADIOSITY_CLONES void findPlaces(const scene::TriangleFrame& frame, const glm::v
 }  // namespace
 
 void LightGatherer::Lit::resize(std::size_t count) {
-  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &share, &front, &point_weight, &visibility})
+  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &share, &front, &point_weight, &visibility, &light_x,
+                       &light_y, &light_z})
     values->resize(count);
+  turn.resize(count);
   node.resize(count);
   care.resize(count);
   doubt.resize(count);
@@ -298,6 +300,8 @@ void LightGatherer::addPlain(const solver::GatherShot& shot, std::size_t first, 
   std::fill_n(&lit_.share[k], count, 1.0F);
   std::fill_n(&lit_.care[k], count, receivers_->careOf(receivers_->all()[first]));
   std::copy_n(receivers_->nodes() + first, count, &lit_.node[k]);
+  for (std::size_t i = 0; i < count; ++i)
+    lit_.turn[k + i] = Receivers::turnOf({receivers_->texelX()[first + i], receivers_->texelY()[first + i]});
   lit_count_ += count;
 }
 
@@ -311,6 +315,7 @@ void LightGatherer::addLit(const Receivers::Receiver& receiver, const Receivers:
   lit_.ny[k] = normal.y;
   lit_.nz[k] = normal.z;
   lit_.node[k] = receiver.node;
+  lit_.turn[k] = Receivers::turnOf(receiver.texel);
   lit_.care[k] = receivers_->careOf(receiver);
   gaps_ += (lit_.care[k] & Receivers::kInGap) != 0 ? 1 : 0;
 }

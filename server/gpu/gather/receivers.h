@@ -187,6 +187,13 @@ class Receivers {
   [[nodiscard]] static glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& point);
   /// Of a place.
   [[nodiscard]] static std::uint64_t placeKey(const glm::vec3& place);
+  /// Which of the turns of a light's points a receiver has, by where it lies on its surface, which edits elsewhere do
+  /// not change: with those around it it looks at points that are spread evenly.
+  [[nodiscard]] static std::uint32_t turnOf(const glm::vec2& texel) {
+    constexpr std::uint32_t kRow = 8;
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(texel.x)) +
+           kRow * static_cast<std::uint32_t>(static_cast<std::int32_t>(texel.y));
+  }
   /// What geometry::kPacket rays at most meet that does not let them pass; `key`: of the chance by which it does.
   void nearest(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<geometry::Hit> hits) const;
   /// Where ways begin at a place, and end at a light: so far before it (unit box).

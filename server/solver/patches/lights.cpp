@@ -113,6 +113,12 @@ void addPolygons(const scene::PatchScene& patches, const Side& side, const glm::
 
 }  // namespace
 
+bool isParallelogram(std::span<const glm::vec3> corners) {
+  constexpr float kRounding = 1e-5F;
+  return corners.size() == 4 && glm::distance(corners[0] + corners[2], corners[1] + corners[3]) <=
+                                    kRounding * glm::distance(corners[0], corners[2]);
+}
+
 glm::vec4 LightPolygon::ball() const {
   const std::span all(corners.data(), corner_count);
   glm::vec3 middle(0.0F);
@@ -124,6 +130,7 @@ glm::vec4 LightPolygon::ball() const {
 
 glm::vec3 LightPolygon::point(double u, double v) const {
   const glm::dvec3 a(corners[0]), b(corners[1]), c(corners[2]), d(corners[3]);
+  if (isParallelogram(std::span(corners.data(), corner_count))) return glm::vec3(a + u * (b - a) + v * (d - a));
   double first = 1.0;  // share of the area in triangle a b c
   if (corner_count == 4) {
     const double abc = glm::length(glm::cross(b - a, c - a)), acd = glm::length(glm::cross(c - a, d - a));

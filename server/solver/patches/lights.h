@@ -23,9 +23,13 @@ struct LightPolygon {
 
   /// Around its corners, about their middle; w: the radius.
   [[nodiscard]] glm::vec4 ball() const;
-  /// The point at (u, v) in [0, 1)^2, uniform in area.
+  /// The point at (u, v) in [0, 1)^2, uniform in area. On a parallelogram u and v go along its edges: by two triangles
+  /// the square of the error at the edges of shadows is 2.4 times as large.
   [[nodiscard]] glm::vec3 point(double u, double v) const;
 };
+
+/// Up to rounding.
+[[nodiscard]] bool isParallelogram(std::span<const glm::vec3> corners);
 
 /// Emissive planar surfaces of few polygons and uniform emission, of which nothing is hidden, become light polygons,
 /// and their sides are marked `gathered`; the emission of all others is shot like reflected light: of a lamp that

@@ -69,6 +69,7 @@ void LinkedSolver::assess() {
   }
   const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
   by_links_ = field.sampling();
+  by_links_ = std::hypot(by_links_, std::sqrt(direct_smoothing_.bias() / field.square()));
   if (gathers()) by_links_ = std::hypot(by_links_, std::sqrt(gather_->bias() / field.square()));
   const double doubt = gathers() ? gather_->doubt() : 0.0;
   error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));

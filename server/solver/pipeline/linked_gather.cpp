@@ -257,7 +257,7 @@ StepOutcome LinkedSolver::chooseRays() {
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   // Samples alone lowered nothing: what halves of the rays differ by after some bounces was taken for the links'.
-  const bool in_vain = sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_;
+  const bool in_vain = rays > 0.0 && sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_;
   if (links_cost <= 0.0 || in_vain) rays += std::exchange(links, 0.0);  // under a sky there may be none
   double best = HUGE_VAL, part = 0.0;
   for (int i = 1; i < kParts; ++i) {

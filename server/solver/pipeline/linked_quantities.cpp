@@ -102,13 +102,14 @@ std::vector<float> LinkedSolver::residualShape() const {
 std::vector<glm::vec3> LinkedSolver::commonErrorSquared() const {
   if (!gathers()) return {};
   std::vector<glm::vec3> squares(patches_->nodeCount(), glm::vec3(0.0F));
-  const auto bias = gather_->biasOfLeaves();
+  const auto bias = gather_->biasOfLeaves(), of_direct = direct_smoothing_.biasOfLeaves();
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const glm::vec3 irradiance = lightOf(side.first_value + leaf), square = irradiance * irradiance;
       const float all = square.x + square.y + square.z;
       const glm::vec3 parts = all > 0.0F ? square / all : glm::vec3(1.0F / 3.0F);
-      squares[side.first_node + leaf] = bias[side.first_value + leaf] * parts;
+      const auto value = side.first_value + leaf;
+      squares[side.first_node + leaf] = (bias[value] + (of_direct.empty() ? 0.0F : of_direct[value])) * parts;
     }
   }
   return squares;

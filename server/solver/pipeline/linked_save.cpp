@@ -9,7 +9,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x394b4e4cU;  // "LNK9": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x414b4e4cU;  // "LNKA": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
@@ -88,6 +88,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
           self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
           self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_,
           self.sampled_alone_, self.shaded_, self.in_haste_, self.rough_);
+  DirectSmoothing::visit(archive, self.direct_smoothing_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
 }
@@ -159,7 +160,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   if (half_[0].size() != values || half_[1].size() != values || shaded_[0].size() != shading_.size() ||
       shaded_[1].size() != shading_.size() || measured_ > wanted_.size() ||
       !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists) ||
-      !std::all_of(rough_.begin(), rough_.end(), exists))
+      !std::all_of(rough_.begin(), rough_.end(), exists) || !direct_smoothing_.fits(values))
     return false;
   bool gathers = false;
   from(gathers);

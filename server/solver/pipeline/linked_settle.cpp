@@ -50,10 +50,23 @@ bool LinkedSolver::settle() {
 }
 
 /// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
+/// Where rays bring the rest.
+void LinkedSolver::smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves,
+                                ShadedLight& factors) const {
+  for (auto& half : factors) half.clear();
+  if (!gather_) return;
+  const auto is_parted = [this](std::uint32_t value) { return gather_->sights().isParted(value); };
+  DirectSmoothing::Halves raw;
+  if (!shading_.empty()) raw = halves;
+  smoothing.smooth(sides_, system_.leafAreas(), is_parted, halves);
+  if (!shading_.empty()) shadedFactors(raw, halves, factors);
+}
+
 bool LinkedSolver::lightLeaves() {
   if (pass_ != Pass::kRays) {
     expander_.forget();
     inBothHalves([&](std::size_t half) { system_.irradiance(half, over_links_[half]); });
+    smoothDirect(direct_smoothing_, over_links_, shaded_factors_);
     pass_ = Pass::kRays;
     if (gather_) gather_->begin(leftLight());
   }

@@ -124,11 +124,34 @@ void LinkedSolver::addShadedLinks(LinkSystem::From from, ShadedLight& light) con
   inTurns(shading_.sides().size(), shadeSide);
 }
 
+/// By number: what smoothing made of the leaf's light.
+void LinkedSolver::shadedFactors(const DirectSmoothing::Halves& raw, const DirectSmoothing::Halves& smooth,
+                                 ShadedLight& factors) const {
+  for (std::size_t half = 0; half < 2; ++half) {
+    factors[half].assign(shading_.size(), glm::vec3(1.0F));
+    for (const auto& shaded : shading_.sides()) {
+      const Side& side = sides_[shaded.side];
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+        const auto &before = raw[half][side.first_value + leaf], &after = smooth[half][side.first_value + leaf];
+        for (int c = 0; c < 3; ++c)
+          if (before[c] > 0.0F)
+            factors[half][shaded.first + leaf][c] = std::clamp(after[c] / before[c], 0.0F, kMostFactor);
+      }
+    }
+  }
+}
+
+void LinkedSolver::scaleShaded(const ShadedLight& factors, ShadedLight& light) {
+  for (std::size_t half = 0; half < 2; ++half)
+    for (std::size_t number = 0; number < factors[half].size(); ++number) light[half][number] *= factors[half][number];
+}
+
 /// Before what rays brought is forgotten.
 void LinkedSolver::shadeLeaves() {
   if (shading_.empty()) return;
   for (auto& half : shaded_) half.assign(shading_.size(), glm::vec3(0.0F));
   addShadedLinks(LinkSystem::From::kAll, shaded_);
+  scaleShaded(std::exchange(shaded_factors_, {}), shaded_);
   if (!gather_) return;
   for (const auto& shaded : shading_.sides()) {
     const Side& side = sides_[shaded.side];

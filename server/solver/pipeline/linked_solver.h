@@ -23,6 +23,7 @@
 #include "server/solver/patches/lights.h"
 #include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/pipeline/kept_ends.h"
+#include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/reflected/leaf_gather.h"
 #include "server/solver/reflected/leaf_shading.h"
 #include "server/solver/solver.h"
@@ -243,6 +244,11 @@ class LinkedSolver final : public Solver {
   /// By half and number of LeafShading: what counts for the shading normal less what does for the geometric one.
   using ShadedLight = std::array<std::vector<glm::vec3>, 2>;
   void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
+  /// `factors`: for what addShadedLinks() adds; empty: none.
+  void smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves, ShadedLight& factors) const;
+  void shadedFactors(const DirectSmoothing::Halves& raw, const DirectSmoothing::Halves& smooth,
+                     ShadedLight& factors) const;
+  static void scaleShaded(const ShadedLight& factors, ShadedLight& light);
   [[nodiscard]] ShadingEmitter emitterOf(const Shooter& shooter) const;
   [[nodiscard]] ShadingEmitter emitterOf(const NodePlace& node) const;
   [[nodiscard]] glm::vec3 shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const;
@@ -392,7 +398,9 @@ class LinkedSolver final : public Solver {
   double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   LeafShading shading_;
-  ShadedLight shaded_;                                // to be added to half_ where it is told
+  ShadedLight shaded_;          // to be added to half_ where it is told
+  ShadedLight shaded_factors_;  // of a new solution, until it is told
+  DirectSmoothing direct_smoothing_;
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
   std::unique_ptr<LeafVariation> variation_;          // once little else is in error
   std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then

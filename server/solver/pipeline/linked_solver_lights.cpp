@@ -178,6 +178,9 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   if (std::ranges::any_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) return {};
   std::array<std::vector<glm::vec3>, 2> halves;
   inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
+  DirectSmoothing smoothing;
+  ShadedLight factors;
+  smoothDirect(smoothing, halves, factors);
   std::vector<glm::vec3> irradiance(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -189,6 +192,7 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   ShadedLight shaded;
   for (auto& half : shaded) half.assign(shading_.size(), glm::vec3(0.0F));
   addShadedLinks(LinkSystem::From::kLights, shaded);
+  scaleShaded(factors, shaded);
   addShaded(shaded, kBothHalves, irradiance);
   return irradiance;
 }

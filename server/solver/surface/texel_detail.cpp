@@ -21,7 +21,8 @@ constexpr double kFinest = 8.0, kCoarsest = 0.5;
 constexpr double kMostDetail = 64.0, kLeastDetail = 0.5;
 /// With fewer of them nothing would be known of what coarser ones hide.
 constexpr double kFewTexels = 64.0;
-/// Lookups average the noise of four texels: of its square they have so much, (2/3)^2, over all places between these.
+/// Lookups average the noise of four texels, but not what smoothing took of the light itself: of its square they have
+/// so much, (2/3)^2, over all places between these.
 constexpr double kLookupNoise = 4.0 / 9.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
 constexpr double kLeastOwn = 0.1;
@@ -82,6 +83,7 @@ struct Need {
   double texels = 0.0;                   ///< with area
   double detail = 1.0;                   ///< Surface::detail
   double square = 0.0, noise = 0.0;      ///< area times irradiance squared, and the noise of its mean
+  double common = 0.0;                   ///< area times the square of what both halves are off by
   std::array<Bend, 2> along, along_two;  ///< by axis; of texels, and of blocks of two by two
   double power = 0.0;                    ///< of the size of texels
   double error = 0.0;                    ///< area times the square of what lookups are off by
@@ -110,13 +112,13 @@ double powerOf(double fine, double coarse, double otherwise) {
 
 class DetailChooser {
  public:
-  DetailChooser(const scene::PatchScene& patches, std::span<const glm::vec3> first, std::span<const glm::vec3> second)
+  DetailChooser(const scene::PatchScene& patches, const TexelLight& light)
       : patches_(patches), needs_(patches.surfaces.size()) {
     for (std::size_t s = 0; s < needs_.size(); ++s) {
       const auto& surface = patches.surfaces[s];
       needs_[s].detail = static_cast<double>(surface.detail);
       for (const auto node : surface.first_node)
-        if (node != scene::kNone) look(surface, node, {first, second}, needs_[s]);
+        if (node != scene::kNone) look(surface, node, light, needs_[s]);
       square_ += needs_[s].square;
     }
     findPowers();
@@ -128,7 +130,7 @@ class DetailChooser {
     for (const auto& place : measured) found[needs_[place.surface].isNarrow() ? 1 : 0] += place.area * place.square;
     for (const auto& need : needs_) {
       const std::size_t kind = need.isNarrow() ? 1 : 0;
-      noise[kind] += kLookupNoise * need.noise;
+      noise[kind] += kLookupNoise * need.noise + need.common;
       expected[kind] += kind == 1 ? need.square : need.error;
     }
     for (auto& need : needs_) {
@@ -166,22 +168,25 @@ class DetailChooser {
  private:
   static constexpr double kMostGain = 1e30;
   static constexpr int kSteps = 100;
-  using Halves = std::array<std::span<const glm::vec3>, 2>;
 
-  void look(const scene::Surface& surface, std::uint32_t node, const Halves& light, Need& need) const {
+  void look(const scene::Surface& surface, std::uint32_t node, const TexelLight& light, Need& need) const {
     Grid grid;
     grid.width = surface.width;
     grid.height = surface.height;
     const auto count = std::size_t{surface.width} * surface.height;
     for (std::size_t i = 0; i < count; ++i) {
       const auto area = static_cast<double>(patches_.node_area[node + i]);
-      const glm::dvec3 one(light[0][node + i]), other(light[1][node + i]);
+      const glm::dvec3 one(light.first[node + i]), other(light.second[node + i]);
       grid.area.push_back(area);
       need.texels += area > 0.0 ? 1.0 : 0.0;
       grid.light[0].push_back(one);
       grid.light[1].push_back(other);
       need.square += area * glm::dot(one, other);
       need.noise += 0.25 * area * glm::dot(one - other, one - other);
+      if (!light.common.empty()) {
+        const auto& common = light.common[node + i];
+        need.common += area * static_cast<double>(common.x + common.y + common.z);
+      }
     }
     const auto coarse = grid.coarser();
     for (std::uint32_t axis = 0; axis < 2; ++axis) {
@@ -248,10 +253,9 @@ class DetailChooser {
 
 }  // namespace
 
-TexelDetail chooseDetail(const scene::PatchScene& patches, std::span<const glm::vec3> first,
-                         std::span<const glm::vec3> second, std::span<const SurfaceError::Measured> measured,
-                         const DetailGoal& goal) {
-  DetailChooser chooser(patches, first, second);
+TexelDetail chooseDetail(const scene::PatchScene& patches, const TexelLight& light,
+                         std::span<const SurfaceError::Measured> measured, const DetailGoal& goal) {
+  DetailChooser chooser(patches, light);
   chooser.calibrate(measured);
   return chooser.choose(goal);
 }

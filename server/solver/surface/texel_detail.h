@@ -28,10 +28,14 @@ struct TexelDetail {
   double texels = 0.0;            ///< that surfaces have then, about
 };
 
-/// `first`, `second`: irradiance by node, of the two independent halves. `measured`: at the surface, with the texels
-/// that there are. Cost: some passes over the leaves.
-[[nodiscard]] TexelDetail chooseDetail(const scene::PatchScene& patches, std::span<const glm::vec3> first,
-                                       std::span<const glm::vec3> second,
+/// What a solver knows, by node.
+struct TexelLight {
+  std::span<const glm::vec3> first, second;  ///< irradiance of the two independent halves
+  std::span<const glm::vec3> common;         ///< Solver::commonErrorSquared()
+};
+
+/// `measured`: at the surface, with the texels that there are. Cost: some passes over the leaves.
+[[nodiscard]] TexelDetail chooseDetail(const scene::PatchScene& patches, const TexelLight& light,
                                        std::span<const SurfaceError::Measured> measured, const DetailGoal& goal);
 
 }  // namespace radiosity::solver

@@ -189,8 +189,10 @@ void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t i
   shot.spots = spotsOf(index, light_key, half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
+  shot.own_points_key = half_key;
+  shot.first_draw = index * points;
   for (std::uint32_t p = 0; p < points; ++p) {
-    const std::uint32_t sequence = index * points + p;
+    const std::uint32_t sequence = shot.first_draw + p;
     const glm::dvec4 sample = sobol4(sequence, half_key);
     batch.points.push_back(
         hemicubeAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(half_key, sequence)));

@@ -95,6 +95,10 @@ struct GatherShot {
   std::uint32_t spot_rows = 1;      ///< how many of them count: a power of two, at most kSpotRows
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
+  /// Of a light of 3 or 4 corners that receivers see by rays: each looks at points of its own, those of Sobol's
+  /// sequence from `first_draw` on, scrambled by the key, turned leaf by leaf. 0: all look at the points of the batch.
+  std::uint64_t own_points_key = 0;
+  std::uint32_t first_draw = 0;
   /// Into ShotBatch::receivers, for measure(): only links to these leaves are wanted, others may be left out. 0: all.
   std::uint32_t first_run = 0, run_count = 0;
   /// Into ShotBatch::boxes, of a shot that names its receivers: what escapes and what is absorbed is wanted only where

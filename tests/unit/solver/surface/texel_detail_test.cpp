@@ -40,7 +40,7 @@ class TexelDetailTest : public testing::Test {
   [[nodiscard]] TexelDetail choose(const DetailGoal& goal, double off = 1.0) const {
     std::vector<SurfaceError::Measured> measured;
     for (std::uint32_t s = 0; s < 3; ++s) measured.push_back({s, off, 1.0});
-    return chooseDetail(*scene_.patches, light_, light_, measured, goal);
+    return chooseDetail(*scene_.patches, {light_, light_, {}}, measured, goal);
   }
 
   test::QuadScene scene_;
@@ -84,6 +84,19 @@ TEST_F(TexelDetailTest, MoreThatIsMeasuredAsksForMore) {
   EXPECT_GT(choose({0.02, 1e6}, 4.0).texels, choose({0.02, 1e6}).texels);
 }
 
+// What both halves are off by is no fault of texels either: finer ones would not change it.
+TEST_F(TexelDetailTest, WhatSmoothingTookIsNotTheirs) {
+  const std::vector<SurfaceError::Measured> measured{{0, 4.0, 1.0}, {1, 4.0, 1.0}, {2, 4.0, 1.0}};
+  const auto chooseWith = [&](float square) {
+    const std::vector<glm::vec3> common(scene_.patches->nodeCount(), glm::vec3(square));
+    return chooseDetail(*scene_.patches, {light_, light_, common}, measured, {0.02, 1e6});
+  };
+  EXPECT_EQ(chooseWith(0.0F).present, choose({0.02, 1e6}, 4.0).present);
+  // Three quarters of the square, over the three surfaces, each of area one and of three channels.
+  EXPECT_NEAR(chooseWith(1.0F).present, 0.5 * chooseWith(0.0F).present, 0.01 * chooseWith(0.0F).present);
+  EXPECT_LT(chooseWith(1.0F).texels, chooseWith(0.0F).texels);
+}
+
 // Halves that bend by chance bend differently: their product is nothing in the mean.
 TEST_F(TexelDetailTest, NoiseIsNoBend) {
   auto first = light_, second = light_;
@@ -93,7 +106,7 @@ TEST_F(TexelDetailTest, NoiseIsNoBend) {
     second[node] *= (leaf * 104729U % 11U) < 5U ? 1.1F : 0.9F;
   }
   const std::vector<SurfaceError::Measured> measured{{0, 1.0, 1.0}, {1, 1.0, 1.0}, {2, 1.0, 1.0}};
-  const auto chosen = chooseDetail(*scene_.patches, first, second, measured, {0.02, 1e6});
+  const auto chosen = chooseDetail(*scene_.patches, {first, second, {}}, measured, {0.02, 1e6});
   EXPECT_LT(chosen.of_surface[0], chosen.of_surface[2] / 2.0F);
 }
 
