@@ -1,10 +1,12 @@
 // Memory as bytes and back, for state that only the very same program reads again: numbers and structs as they lie in
-// memory, vectors with their length. One function can serve both ways: archive(a, b, c). Plain values; one thread.
+// memory, vectors with their length, and what has a visit(archive, self) by that. One function can serve both ways:
+// archive(a, b, c). Plain values; one thread.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -30,8 +32,16 @@ class ArchiveWriter {
  private:
   template <typename T>
   void put(const T& value) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    append(&value, sizeof(T));
+    if constexpr (requires { T::visit(*this, value); }) {
+      T::visit(*this, value);
+    } else {
+      static_assert(std::is_trivially_copyable_v<T>);
+      append(&value, sizeof(T));
+    }
+  }
+  template <typename T>
+  void put(const std::shared_ptr<const std::vector<T>>& values) {
+    put(values ? *values : std::vector<T>());
   }
   template <typename T>
   void put(const std::vector<T>& values) {
@@ -80,8 +90,19 @@ class ArchiveReader {
  private:
   template <typename T>
   void get(T& value) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    extract(&value, sizeof(T));
+    if constexpr (requires { T::visit(*this, value); }) {
+      T::visit(*this, value);
+    } else {
+      static_assert(std::is_trivially_copyable_v<T>);
+      extract(&value, sizeof(T));
+    }
+  }
+  /// Null where it is empty.
+  template <typename T>
+  void get(std::shared_ptr<const std::vector<T>>& values) {
+    std::vector<T> read;
+    get(read);
+    values = read.empty() ? nullptr : std::make_shared<const std::vector<T>>(std::move(read));
   }
   template <typename T>
   void get(std::vector<T>& values) {

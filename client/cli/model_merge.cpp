@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <map>
 #include <set>
@@ -14,8 +15,12 @@
 namespace radiosity::cli {
 namespace {
 
-constexpr const char* kLightsExtension = "KHR_lights_punctual";
-const Json::json_pointer kLights("/extensions/KHR_lights_punctual/lights");
+/// Each has a list of lights at the root, which nodes name by number.
+constexpr std::array kLightsExtensions{"KHR_lights_punctual", "EXT_lights_area", "EXT_lights_ies"};
+
+Json::json_pointer lightsOf(const std::string& extension) {
+  return Json::json_pointer("/extensions/" + extension + "/lights");
+}
 
 std::uint32_t wordAt(std::string_view bytes, std::size_t at) {
   std::uint32_t word = 0;
@@ -31,7 +36,8 @@ class Renumber {
     for (const char* array : {"accessors", "buffers", "bufferViews", "cameras", "images", "materials", "meshes",
                               "nodes", "samplers", "textures"})
       first_[array] = scene.contains(array) && scene[array].is_array() ? scene[array].size() : 0;
-    first_["lights"] = scene.contains(kLights) ? scene.at(kLights).size() : 0;
+    for (const auto* name : kLightsExtensions)
+      first_[name] = scene.contains(lightsOf(name)) ? scene.at(lightsOf(name)).size() : 0;
   }
 
   [[nodiscard]] std::size_t first(const std::string& array) const { return first_.at(array); }
@@ -48,6 +54,7 @@ class Renumber {
     move(accessor["sparse"]["values"], "bufferView", "bufferViews");
   }
   void image(Json& image) const { move(image, "bufferView", "bufferViews"); }
+  void light(Json& light) const { move(light, "bufferView", "bufferViews"); }
   void texture(Json& texture) const {
     move(texture, "source", "images");
     move(texture, "sampler", "samplers");
@@ -78,7 +85,8 @@ class Renumber {
     if (node.contains("children")) moveAll(node["children"], "nodes");
     if (!node.contains("extensions")) return;
     auto& extensions = node["extensions"];
-    if (extensions.contains(kLightsExtension)) move(extensions[kLightsExtension], "light", "lights");
+    for (const auto* name : kLightsExtensions)
+      if (extensions.contains(name)) move(extensions[name], "light", name);
     if (extensions.contains("EXT_mesh_gpu_instancing"))
       moveAll(extensions["EXT_mesh_gpu_instancing"]["attributes"], "accessors");
   }
@@ -145,12 +153,18 @@ class Merger {
   }
 
   void lights() {
-    if (!model_.contains(kLights)) return;
-    Json lights = model_.at(kLights);
-    if (scene_.contains(kLights)) return appendList(kLights.to_string(), true, std::move(lights));
-    Json extension = {{"lights", std::move(lights)}};
-    if (scene_.contains("extensions")) return add("/extensions/KHR_lights_punctual", std::move(extension));
-    add("/extensions", {{kLightsExtension, std::move(extension)}});
+    bool there = scene_.contains("extensions");
+    for (const std::string name : kLightsExtensions) {
+      if (!model_.contains(lightsOf(name))) continue;
+      Json lights = model_.at(lightsOf(name));
+      for (auto& light : lights) renumber_.light(light);
+      if (scene_.contains(lightsOf(name))) {
+        appendList(lightsOf(name).to_string(), true, std::move(lights));
+        continue;
+      }
+      if (!std::exchange(there, true)) add("/extensions", Json::object());
+      add("/extensions/" + name, {{"lights", std::move(lights)}});
+    }
   }
 
   void extensions() {
@@ -228,15 +242,16 @@ class Merger {
 
 /// A GLB for `add` goes whole: what lies in other files would be asked of the server, which has no such upload.
 Result<void> expectAllInside(const Json& gltf, const std::string& name) {
-  for (const char* list : {"buffers", "images"}) {
-    const auto entries = gltf.find(list);
-    if (entries == gltf.end() || !entries->is_array()) continue;
-    for (std::size_t i = 0; i < entries->size(); ++i) {
-      const auto& entry = (*entries)[i];
+  for (const std::string list : {"/buffers", "/images", "/extensions/EXT_lights_ies/lights"}) {
+    const Json::json_pointer pointer(list);
+    if (!gltf.contains(pointer) || !gltf.at(pointer).is_array()) continue;
+    const auto& entries = gltf.at(pointer);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const auto& entry = entries[i];
       const auto uri = entry.is_object() ? entry.value("uri", Json()) : Json();
       if (!uri.is_string() || uri.get_ref<const std::string&>().starts_with("data:")) continue;
       return fail(ErrorCode::kBadInput, uri.dump() + " is another file; pack it into the .glb, or add a .gltf",
-                  fmt::format("{}: /{}/{}/uri", name, list, i));
+                  fmt::format("{}: {}/{}/uri", name, list, i));
     }
   }
   return {};

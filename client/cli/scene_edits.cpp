@@ -15,8 +15,9 @@ namespace radiosity::cli {
 namespace {
 
 constexpr const char* kLights = "/extensions/KHR_lights_punctual/lights";
+constexpr const char* kAreaLights = "/extensions/EXT_lights_area/lights";
 
-enum class Kind { kMaterial, kLight, kNode };
+enum class Kind { kMaterial, kLight, kAreaLight, kNode };
 
 /// What follows "@NAME.": where it lies, seen from the thing, and how its value is written.
 struct Property {
@@ -41,6 +42,15 @@ constexpr std::array kProperties = {
     Property{"intensity", Kind::kLight, "/intensity", Property::Value::kAny, "candela, or lux of a directional light"},
     Property{"color", Kind::kLight, "/color", Property::Value::kColor, "R,G,B of the light"},
     Property{"range", Kind::kLight, "/range", Property::Value::kAny, "metres"},
+    Property{"radius", Kind::kLight, "/extras/radiosityRadius", Property::Value::kAny,
+             "metres, of the ball that a point light is, or of a spot's disc"},
+    Property{"intensity", Kind::kAreaLight, "/intensity", Property::Value::kAny, "nits"},
+    Property{"color", Kind::kAreaLight, "/color", Property::Value::kColor, "R,G,B of the light"},
+    Property{"size", Kind::kAreaLight, "/size", Property::Value::kAny,
+             "metres: diameter of a disc, height of a rectangle"},
+    Property{"aspect", Kind::kAreaLight, "/rect/aspect", Property::Value::kAny, "width of a rectangle / its height"},
+    Property{"multiplier", Kind::kNode, "/extensions/EXT_lights_ies/multiplier", Property::Value::kAny,
+             "factor of the candela of an IES file"},
     Property{"translation", Kind::kNode, "/translation", Property::Value::kAny, "X,Y,Z in metres"},
     Property{"rotation", Kind::kNode, "/rotation", Property::Value::kAny, "quaternion X,Y,Z,W"},
     Property{"scale", Kind::kNode, "/scale", Property::Value::kScale, "X,Y,Z, none of them 0"},
@@ -74,10 +84,22 @@ std::vector<std::size_t> named(const Json& array, const std::string& name) {
 }
 
 std::string arrayOf(Kind kind) {
-  return kind == Kind::kMaterial ? "/materials" : kind == Kind::kLight ? kLights : "/nodes";
+  switch (kind) {
+    case Kind::kMaterial:
+      return "/materials";
+    case Kind::kLight:
+      return kLights;
+    case Kind::kAreaLight:
+      return kAreaLights;
+    default:
+      return "/nodes";
+  }
 }
 
-std::string nounOf(Kind kind) { return kind == Kind::kMaterial ? "material" : kind == Kind::kLight ? "light" : "node"; }
+std::string nounOf(Kind kind) {
+  constexpr std::array kNouns{"material", "light", "area light", "node"};
+  return kNouns[static_cast<std::size_t>(kind)];
+}
 
 /// A scale of 0 makes a sheet of a body: faces that look both ways in one plane, which no light can tell apart.
 bool isScale(const std::array<double, 3>& scale) {
@@ -102,8 +124,9 @@ std::string someNames(const Json& array) {
 /// Materials of the node's mesh, or its light.
 std::vector<std::size_t> thingsOfNode(const Json& gltf, const Json& node, Kind kind) {
   std::set<std::size_t> found;
-  if (kind == Kind::kLight) {
-    const Json::json_pointer light("/extensions/KHR_lights_punctual/light");
+  if (kind == Kind::kLight || kind == Kind::kAreaLight) {
+    const Json::json_pointer light(kind == Kind::kLight ? "/extensions/KHR_lights_punctual/light"
+                                                        : "/extensions/EXT_lights_area/light");
     if (node.contains(light)) found.insert(node.at(light).get<std::size_t>());
   } else if (node.contains("mesh")) {
     for (const auto& primitive : gltf.at("meshes").at(node["mesh"].get<std::size_t>()).at("primitives")) {

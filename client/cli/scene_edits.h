@@ -13,7 +13,7 @@ namespace radiosity::cli {
 using Json = nlohmann::json;
 
 /// "@lamp.emissiveStrength" or a JSON pointer, and the value as JSON, as numbers with commas, or as a word. Properties
-/// are those of materials, punctual lights and nodes; the node that has the material or the light may be named instead.
+/// are those of materials, lights and nodes; the node that has the material or the light may be named instead.
 [[nodiscard]] Result<Json> setPatch(const Json& gltf, const std::string& target, const std::string& value);
 /// The names that may follow "@NAME." and what they mean, for the help text.
 [[nodiscard]] std::string propertyHelp();

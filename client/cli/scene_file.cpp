@@ -87,10 +87,21 @@ bool isExternal(const nlohmann::json& entry) {
          !entry["uri"].get_ref<const std::string&>().starts_with("data:");
 }
 
+/// Lists of a document whose entries may lie in files of their own.
+constexpr std::array kLists{"/buffers", "/images", "/extensions/EXT_lights_ies/lights"};
+
+/// Null: there is none.
+template <typename Document>
+Document* listAt(Document& document, const char* list) {
+  const nlohmann::json::json_pointer pointer(list);
+  return document.contains(pointer) && document.at(pointer).is_array() ? &document.at(pointer) : nullptr;
+}
+
 std::string mediaType(const nlohmann::json& entry, const std::string& list, const std::string& file) {
-  if (list == "buffers") return "application/octet-stream";
+  if (list == "/buffers") return "application/octet-stream";
   if (entry.contains("mimeType") && entry["mimeType"].is_string()) return entry["mimeType"].get<std::string>();
   const std::string extension = extensionOf(file);
+  if (list != "/images") return extension == ".ldt" ? "application/x-eulumdat" : "application/x-ies-lm-63";
   if (extension == ".jpg" || extension == ".jpeg") return "image/jpeg";
   if (extension == ".webp") return "image/webp";
   if (extension == ".ktx2") return "image/ktx2";
@@ -149,9 +160,9 @@ Result<SceneKind> sceneKind(const std::string& path) {
 Result<bool> hasExternalFiles(const std::string& path) {
   const auto document = readGltf(path);
   if (!document) return tl::unexpected(document.error());
-  for (const std::string list : {"buffers", "images"})
-    if (document->contains(list) && (*document)[list].is_array() &&
-        std::any_of((*document)[list].begin(), (*document)[list].end(), isExternal))
+  for (const auto* list : kLists)
+    if (const auto* entries = listAt(*document, list);
+        entries != nullptr && std::any_of(entries->begin(), entries->end(), isExternal))
       return true;
   return false;
 }
@@ -163,12 +174,13 @@ Result<std::string> inlineExternalFiles(const std::string& path) {
   const fs::path folder = fs::canonical(fs::absolute(path).parent_path(), error);
   if (error) return fail(ErrorCode::kBadInput, error.message(), path);
   std::uint64_t total_bytes = 0;
-  for (const std::string list : {"buffers", "images"}) {
-    if (!document->contains(list) || !(*document)[list].is_array()) continue;
-    auto& entries = (*document)[list];
+  for (const auto* list : kLists) {
+    auto* found = listAt(*document, list);
+    if (found == nullptr) continue;
+    auto& entries = *found;
     for (std::size_t i = 0; i < entries.size(); ++i) {
       if (!isExternal(entries[i])) continue;
-      const std::string where = path + ": /" + list + "/" + std::to_string(i) + "/uri";
+      const std::string where = path + ": " + list + "/" + std::to_string(i) + "/uri";
       if (auto done = inlineEntry(entries[i], list, folder, where); !done) return tl::unexpected(done.error());
       total_bytes += entries[i]["uri"].get_ref<const std::string&>().size();
       if (total_bytes > kMaxSceneBytes)

@@ -33,6 +33,28 @@ solver::ShotBatch mixedBatch(const scene::PatchScene& scene, std::uint32_t shots
   return batch;
 }
 
+void addLamps(solver::ShotBatch& batch) {
+  using Kind = solver::LampShape::Kind;
+  batch.webs = {2.0F, 1.0F, 0.0F, 180.0F, 0.0F, 5.0F, 1.0F, 3.0F, 1.0F, 0.0F, 90.0F, 180.0F, 0.0F, 4.0F, 2.0F, 1.0F};
+  for (const auto kind : {Kind::kDisc, Kind::kBall, Kind::kRectangle, Kind::kWeb, Kind::kWeb, Kind::kWeb}) {
+    solver::LampShot shot;
+    const auto number = static_cast<std::uint32_t>(batch.lamps.size());
+    shot.shape = {kind, {0.1F * static_cast<float>(number), 0.1F, 0.1F}, {0, 0, -1}, {1, 0, 0}, {0.1F, 0.05F}};
+    if (kind == Kind::kWeb) {
+      shot.first_web = number < 5 ? 7 : 0;
+      shot.web_size = number < 5 ? 9 : 7;
+    }
+    shot.intensity = {3.0, 0.5, 0.1};
+    shot.emitted = {18.0, 3.0, 0.6};
+    shot.half = number % 2;
+    shot.key = number;
+    shot.receivers.count = 4;
+    for (std::uint32_t p = 0; p < 4; ++p)
+      shot.at[p] = shot.receivers.at[p] = {0.1F + 0.2F * static_cast<float>(p), 0.4F};
+    batch.lamps.push_back(shot);
+  }
+}
+
 void expectSame(const solver::FluxAccumulators& a, const solver::FluxAccumulators& b) {
   EXPECT_EQ(a.node, b.node);
   EXPECT_EQ(a.escaped, b.escaped);

@@ -84,6 +84,7 @@ class Crew : public ::testing::Test {
   /// With lamps of every kind.
   static solver::ShotBatch batchOf(const scene::PatchScene& scene) {
     auto batch = mixedBatch(scene, 30);
+    addLamps(batch);
     for (std::uint32_t i = 0; i < 5; ++i) {
       solver::PointShot point;
       point.frame.origin = {0.05F * static_cast<float>(i), 0.1F, 0.2F};
@@ -116,7 +117,7 @@ TEST_F(Crew, AnyNumberOfHandsDeliversTheSameBits) {
     if (counters) {
       EXPECT_EQ(counters->scatter_shots, batch.scatter.size());
       EXPECT_EQ(counters->gather_shots, batch.gather.size());
-      EXPECT_EQ(counters->point_images, batch.point_lights.size());
+      EXPECT_EQ(counters->point_images, batch.point_lights.size() + batch.lamps.size());
       EXPECT_EQ(counters->parallel_images, batch.parallel.size());
     }
     return flux;

@@ -157,7 +157,8 @@ TEST(BatchChunks, OfWorkersWithManyHandsHoldSomethingForEachAndAsManyLinksAsFit)
 
 TEST_F(Workers, AnyNumberOfWorkersGivesTheBitsOfOneProcess) {
   const auto scene = randomRoom(402, 13742, 2);
-  const auto batch = mixedBatch(*scene, 150);
+  auto batch = mixedBatch(*scene, 150);
+  addLamps(batch);
   ASSERT_TRUE(in_process_->setScene(scene).has_value());
   const auto expected = run(*in_process_, *scene, batch);
   EXPECT_NE(expected.scattered, solver::Flux3{});

@@ -176,7 +176,7 @@ std::string endOf(const LitParts& parts, const solver::LostLight::Fate& fate, bo
   return "it leaves the scene, or ends " + backsOf(parts, fate);
 }
 
-/// Nodes of visible lights without extent, in the order in which the importer meets them.
+/// Nodes of visible lights that are no surfaces, in the order in which the importer meets them.
 std::vector<std::size_t> lightNodes(const nlohmann::json& gltf) {
   using nlohmann::json;
   const auto nodes = gltf.value("nodes", json::array());
@@ -193,7 +193,8 @@ std::vector<std::size_t> lightNodes(const nlohmann::json& gltf) {
     stack.pop_back();
     const auto extensions = nodes.at(at).value("extensions", json::object());
     if (!extensions.value("KHR_node_visibility", json::object()).value("visible", true)) continue;
-    if (extensions.contains("KHR_lights_punctual")) found.push_back(at);
+    for (const auto* name : {"KHR_lights_punctual", "EXT_lights_area", "EXT_lights_ies"})
+      if (extensions.contains(name)) found.push_back(at);
     push(nodes.at(at).value("children", json::array()));
   }
   return found;
@@ -222,9 +223,8 @@ void tellBacks(const LitParts& parts, const std::vector<solver::LostLight::Share
 
 std::string lightName(const LitParts& parts, std::size_t number) {
   const auto& light = parts.sources.lights[number];
-  const char* kind = light.kind == scene::LightKind::kPoint  ? "point"
-                     : light.kind == scene::LightKind::kSpot ? "spot"
-                                                             : "directional";
+  static constexpr std::array kKinds{"point", "spot", "directional", "rectangular area", "round area", "IES"};
+  const char* kind = kKinds[static_cast<std::size_t>(light.kind)];
   const auto nodes = lightNodes(parts.document.gltf);
   if (nodes.size() != parts.sources.lights.size()) return fmt::format("{} light {}", kind, number);
   return fmt::format("{} light {}", kind, nodeName(parts.document, nodes[number]));

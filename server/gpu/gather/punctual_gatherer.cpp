@@ -17,10 +17,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A leaf whose size is more than this part of its distance from the light takes its mean irradiance from its solid
-/// angle: points of it would differ too much.
-constexpr float kNear = 0.3F;
-
 /// So many rays find out what of a light is lost, and of one of the many directions of a sky.
 constexpr std::uint32_t kLostRays = 16384, kLostRaysOfSky = 1024;
 
@@ -35,14 +31,6 @@ float rangeFade(const solver::PointShot& shot, float distance) {
   if (shot.range <= 0.0F) return 1.0F;
   const float square = distance * distance / (shot.range * shot.range);
   return std::clamp(1.0F - square * square, 0.0F, 1.0F);
-}
-
-/// Solid angle of a triangle seen from the origin (van Oosterom and Strackee 1983), sr; always positive.
-double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
-  const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-  const double volume = std::abs(glm::dot(a, glm::cross(b, c)));
-  const double base = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
-  return 2.0 * std::atan2(volume, base);
 }
 
 /// Where a receiver lies in a picture of `columns` x `rows` pixels: at (x, y), where pixel i reaches from i to i + 1.
@@ -140,15 +128,7 @@ void PunctualGatherer::arriveAtGroup(const solver::PointShot& shot, const Receiv
     const auto& receiver = receivers_->all()[i];
     const auto& frame = patches.triangles[receiver.triangle];
     if (surface.planar && group.side * glm::dot(frame.normal, o - frame.origin) <= 0.0F) return;  // all turns away
-    const auto middle = receivers_->point(receiver, glm::vec2(0.5F)) - o;
-    const float size2 = glm::dot(frame.du, frame.du) + glm::dot(frame.dv, frame.dv);
-    float near_mean = -1.0F;
-    if (receiver.full && size2 > kNear * kNear * glm::dot(middle, middle)) {
-      const glm::dvec3 corner(receivers_->point(receiver, glm::vec2(0.0F)) - o), du(frame.du), dv(frame.dv);
-      const double angle =
-          solidAngle(corner, corner + du, corner + du + dv) + solidAngle(corner, corner + du + dv, corner + dv);
-      near_mean = static_cast<float>(angle / glm::length(glm::cross(du, dv)));
-    }
+    const float near_mean = nearMean(*receivers_, receiver, frame, o);
     const std::uint32_t count = (receiver.full || receiver.hasSpots()) ? shot.receivers.count : 1;
     for (std::uint32_t p = 0; p < count; ++p) {
       const auto [at, place] = receivers_->place(receiver, shot.receivers.at[p]);
@@ -177,9 +157,8 @@ void PunctualGatherer::forEachArrival(const solver::PointShot& shot, const Take&
 }
 
 /// Every pixel stands for its solid angle, (2 / N)^2 / (1 + u^2 + v^2)^(3/2), at (u, v) on its face of the cube.
-PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot,
-                                                   std::span<const std::uint32_t> items) const {
-  Lost lost;
+LostShare PunctualGatherer::weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const {
+  LostShare lost;
   const auto [o, t, b, n] = hemicubeAxes(shot.frame);
   const auto [across, up] = latticePhase(shot.frame.lattice);
   const auto size = shot.resolution;
@@ -235,7 +214,8 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
     const bool two_sided = (arrival.care & Receivers::kTwoSided) != 0;
     if (!isHidden(*receivers_, image.at(local), arrival.ray, two_sided)) sum_[arrival.receiver] += arrival.value;
   });
-  deliver(shot.intensity, shot.emitted, weighLost(shot, items), shot.half, flux_scale, sink, counters);
+  deliverLight(*receivers_, sum_, {shot.intensity, shot.emitted, shot.half}, weighLost(shot, items), flux_scale, sink,
+               counters);
   ++counters.point_images;
   counters.gather_seconds +=
       std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
@@ -268,15 +248,15 @@ void PunctualGatherer::forEachArrival(const solver::ParallelShot& shot, const so
   }
 }
 
-PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::ParallelView& view, double pixel_area,
-                                                   std::span<const std::uint32_t> items) const {
+LostShare PunctualGatherer::weighLost(const solver::ParallelView& view, double pixel_area,
+                                      std::span<const std::uint32_t> items) const {
   std::size_t hit = 0, absorbed = 0;
   for (const auto item : items) {
     if (item == RAD_ITEM_NONE) continue;
     ++hit;
     if (receivers_->absorbs(item, glm::dot(receivers_->plane(item).normal, view.direction) <= 0.0F)) ++absorbed;
   }
-  Lost lost;
+  LostShare lost;
   lost.all = solver::boxSilhouette(box_, view.direction);
   lost.escaped = lost.all - static_cast<double>(hit) * pixel_area;
   lost.absorbed = static_cast<double>(absorbed) * pixel_area;
@@ -327,7 +307,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   const auto pixels = std::size_t{shot.resolution} * shot.resolution;
   const auto capacity = source.parallelCapacity(shot.resolution);
   sum_.assign(receivers_->all().size(), 0.0F);
-  Lost lost;
+  LostShare lost;
   for (std::size_t first = 0; first < mine.size(); first += capacity) {
     const auto some = mine.subspan(first, std::min(capacity, mine.size() - first));
     const auto images = source.parallel(shot.resolution, some, counters);
@@ -350,34 +330,10 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
     }
   }
   if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
-  deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);
+  deliverLight(*receivers_, sum_, {shot.irradiance, shot.emitted, shot.half}, lost, flux_scale, sink, counters);
   counters.parallel_images += mine.size();
   counters.gather_seconds +=
       std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
-}
-
-void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted,
-                               const Lost& lost, std::uint32_t half, double flux_scale, const FluxSink& sink,
-                               solver::TransportCounters& counters) const {
-  for (std::size_t i = 0; i < sum_.size(); ++i) {
-    if (sum_[i] <= 0.0F) continue;
-    const auto node = receivers_->all()[i].node;
-    const double factor =
-        flux_scale * static_cast<double>(sum_[i]) * static_cast<double>(receivers_->patches().node_area[node]);
-    solver::Flux3 flux{};
-    for (std::size_t channel = 0; channel < 3; ++channel) {
-      flux[channel] = std::lrint(unit[channel] * factor);
-      sink.totals->gathered[channel] += flux[channel];
-    }
-    sink.add(half, node, flux);
-    ++counters.links;
-  }
-  if (lost.all <= 0.0) return;
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const double flux = emitted[channel] * flux_scale / lost.all;
-    sink.totals->escaped[channel] += std::lrint(flux * lost.escaped);
-    sink.totals->backface[channel] += std::lrint(flux * lost.absorbed);
-  }
 }
 
 /// `look`: the same for no two looks, so that what one can see through lets each pass by a chance of its own. Ways end
@@ -408,7 +364,8 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
   sum_.assign(receivers_->all().size(), 0.0F);
   askRays(lookOf(shot.frame.tangent, static_cast<float>(shot.frame.lattice), shot.half),
           [&](const auto& take) { forEachArrival(shot, take); });
-  deliver(shot.intensity, shot.emitted, loseByRays(shot), shot.half, flux_scale, sink, counters);
+  deliverLight(*receivers_, sum_, {shot.intensity, shot.emitted, shot.half}, loseByRays(shot), flux_scale, sink,
+               counters);
   ++counters.point_images;  // a look is counted as one, whichever way
   counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -418,26 +375,26 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   const auto start = Clock::now();
   const auto mine = views.subspan(shot.first_view, shot.view_count);
   sum_.assign(receivers_->all().size(), 0.0F);
-  Lost lost;
+  LostShare lost;
   for (std::size_t i = 0; i < mine.size(); ++i) {
     askRays(lookOf(mine[i].right, mine[i].shift.x, shot.half),
             [&](const auto& take) { forEachArrival(shot, mine[i], i, take); });
     lost += loseByRays(mine[i], shot.sky_count > 0 ? kLostRaysOfSky : kLostRays);
   }
   if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
-  deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);
+  deliverLight(*receivers_, sum_, {shot.irradiance, shot.emitted, shot.half}, lost, flux_scale, sink, counters);
   counters.parallel_images += mine.size();
   counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 /// Rays spread evenly over the solid angle into which the light shines.
-PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& shot) const {
+LostShare PunctualGatherer::loseByRays(const solver::PointShot& shot) const {
   const auto [o, t, b, n] = hemicubeAxes(shot.frame);
   const float least = shot.cone_scale > 0.0F ? std::clamp(-shot.cone_offset / shot.cone_scale, 0.0F, 1.0F) : 0.0F;
   const auto key = lookOf(shot.frame.tangent, static_cast<float>(shot.frame.lattice), shot.half);
   const solver::Sobol4 draws(key);
   const float reach = glm::distance(o, 0.5F * (box_[0] + box_[1])) + glm::distance(box_[0], box_[1]);
-  Lost lost;
+  LostShare lost;
   for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
     interruptionPoint();
     std::array<geometry::Ray, geometry::kPacket> rays;
@@ -464,7 +421,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& sho
 }
 
 /// Rays spread evenly over a disk around the box, which the light crosses.
-PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& view, std::uint32_t count) const {
+LostShare PunctualGatherer::loseByRays(const solver::ParallelView& view, std::uint32_t count) const {
   const auto centre = 0.5F * (box_[0] + box_[1]);
   const float radius = 0.5F * glm::distance(box_[0], box_[1]);
   const auto up = glm::cross(view.direction, view.right);
@@ -489,7 +446,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& 
     }
   }
   const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / count;
-  Lost lost;
+  LostShare lost;
   lost.all = solver::boxSilhouette(box_, view.direction);
   lost.escaped = lost.all - static_cast<double>(hit) * ray_area;
   lost.absorbed = static_cast<double>(absorbed) * ray_area;

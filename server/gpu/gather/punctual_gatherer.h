@@ -8,6 +8,7 @@
 
 #include "server/gpu/draw/image_source.h"
 #include "server/gpu/gather/flux_sink.h"
+#include "server/gpu/gather/light_delivery.h"
 #include "server/gpu/gather/receivers.h"
 
 namespace radiosity::gpu {
@@ -31,18 +32,6 @@ class PunctualGatherer {
               const FluxSink& sink, solver::TransportCounters& counters);
 
  private:
-  /// Shares of a shot's flux that left the scene, and that fell on unlit sides.
-  struct Lost {
-    double all = 0.0, escaped = 0.0, absorbed = 0.0;
-
-    Lost& operator+=(const Lost& other) {
-      all += other.all;
-      escaped += other.escaped;
-      absorbed += other.absorbed;
-      return *this;
-    }
-  };
-
   /// What a light brings to a place, should nothing hide it, and the way to the light.
   struct Arrival {
     std::size_t receiver;
@@ -59,16 +48,14 @@ class PunctualGatherer {
   void arriveAtGroup(const solver::PointShot& shot, const Receivers::Group& group, const Take& take) const;
   template <typename Each>
   void askRays(std::uint64_t look, const Each& each);
-  [[nodiscard]] Lost weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
-  [[nodiscard]] Lost weighLost(const solver::ParallelView& view, double pixel_area,
-                               std::span<const std::uint32_t> items) const;
-  [[nodiscard]] Lost loseByRays(const solver::PointShot& shot) const;
-  [[nodiscard]] Lost loseByRays(const solver::ParallelView& view, std::uint32_t count) const;
+  [[nodiscard]] LostShare weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
+  [[nodiscard]] LostShare weighLost(const solver::ParallelView& view, double pixel_area,
+                                    std::span<const std::uint32_t> items) const;
+  [[nodiscard]] LostShare loseByRays(const solver::PointShot& shot) const;
+  [[nodiscard]] LostShare loseByRays(const solver::ParallelView& view, std::uint32_t count) const;
   [[nodiscard]] static float skyScale(std::span<const glm::vec3> normals, const glm::vec3& axis,
                                       std::span<const solver::ParallelView> sky);
   void scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky);
-  void deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, const Lost& lost,
-               std::uint32_t half, double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) const;
 
   std::shared_ptr<const Receivers> receivers_;
   std::array<glm::vec3, 2> box_{};

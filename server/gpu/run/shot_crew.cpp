@@ -100,6 +100,7 @@ std::vector<ShotCrew::Part> ShotCrew::partsOf(const ShotSpan& shots) const {
       part.shots.gather = {};
       part.shots.point_lights = {};
       part.shots.parallel = {};
+      part.shots.lamps = {};
       part.shots.*kind = all.subspan(first, std::min(most, all.size() - first));
       parts.push_back(part);
     }
@@ -107,6 +108,7 @@ std::vector<ShotCrew::Part> ShotCrew::partsOf(const ShotSpan& shots) const {
   cut(&ShotSpan::gather, 0);
   cut(&ShotSpan::parallel, 0);
   cut(&ShotSpan::point_lights, 0);
+  cut(&ShotSpan::lamps, 0);
   cut(&ShotSpan::scatter, shots.gather.size());
   return parts;
 }

@@ -43,14 +43,23 @@ Result<void> checkPunctual(const ShotSpan& shots) {
                 "resolution must be even and 4..2048, half 0 or 1, 1 to 8 receiving points, views inside the batch",
                 "parallel shot " + std::to_string(i));
   }
+  for (std::size_t i = 0; i < shots.lamps.size(); ++i) {
+    const auto& shot = shots.lamps[i];
+    const bool web_fits = shot.shape.kind != solver::LampShape::Kind::kWeb ||
+                          (inside(shot.first_web, shot.web_size, shots.webs.size()) &&
+                           scene::isWebTable(shots.webs.subspan(shot.first_web, shot.web_size)));
+    if (shot.half <= 1 && goodReceivers(shot.receivers) && web_fits) continue;
+    return fail(ErrorCode::kInternal, "half must be 0 or 1, 1 to 8 receiving points, a web inside the batch",
+                "lamp shot " + std::to_string(i));
+  }
   return {};
 }
 
 }  // namespace
 
 ShotSpan spanOf(const solver::ShotBatch& batch) {
-  return {batch.mode,         batch.flux_scale, batch.scatter, batch.gather,    batch.points,
-          batch.point_lights, batch.parallel,   batch.views,   batch.receivers, batch.boxes};
+  return {batch.mode,     batch.flux_scale, batch.scatter,   batch.gather, batch.points, batch.point_lights,
+          batch.parallel, batch.views,      batch.receivers, batch.boxes,  batch.lamps,  batch.webs};
 }
 
 Result<void> checkShots(const ShotSpan& shots) {
@@ -94,6 +103,7 @@ void ShotRunner::setScene(const std::shared_ptr<const Receivers>& receivers, Sig
   receivers_ = receivers;
   sight_ = sight;
   punctual_ = PunctualGatherer(receivers);
+  lamps_ = LampGatherer(receivers);
   accumulator_ = ScatterAccumulator(receivers->patches().nodeCount());
   gatherer_ = LightGatherer(receivers);
   link_store_.reset();
@@ -107,6 +117,7 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   }
   solver::TransportCounters counters;
   scatter(shots, sink, counters);
+  for (const auto& shot : shots.lamps) lamps_.gather(shot, shots.webs, shots.flux_scale, sink, counters);
   if (sight_ == Sight::kRays && shots.mode != solver::LinkMode::kPaperMipmap) {
     gatherByRays(shots, sink, counters);
     if (const auto good = images_.check(); !good) return tl::unexpected(good.error());

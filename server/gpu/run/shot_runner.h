@@ -8,6 +8,7 @@
 
 #include "server/gpu/draw/image_source.h"
 #include "server/gpu/gather/flux_sink.h"
+#include "server/gpu/gather/lamp_gatherer.h"
 #include "server/gpu/gather/light_gatherer.h"
 #include "server/gpu/gather/punctual_gatherer.h"
 #include "server/gpu/gather/scatter_accumulator.h"
@@ -15,7 +16,7 @@
 
 namespace radiosity::gpu {
 
-/// Part of a batch (or all of it). Gather shots index `points`, parallel shots `views`.
+/// Part of a batch (or all of it). Gather shots index `points`, parallel shots `views`, lamps `webs`.
 struct ShotSpan {
   solver::LinkMode mode = solver::LinkMode::kFormula;
   double flux_scale = 1.0;
@@ -27,6 +28,8 @@ struct ShotSpan {
   std::span<const solver::ParallelView> views;
   std::span<const solver::NodeRun> receivers;  ///< of gather shots that want not all
   std::span<const scene::ChangedBox> boxes;
+  std::span<const solver::LampShot> lamps;
+  std::span<const float> webs;  ///< of the lamps
 };
 [[nodiscard]] ShotSpan spanOf(const solver::ShotBatch& batch);
 
@@ -61,6 +64,7 @@ class ShotRunner {
   std::shared_ptr<const Receivers> receivers_;
   std::optional<FluxStore> link_store_;
   PunctualGatherer punctual_;
+  LampGatherer lamps_;
 };
 
 /// kInternal, naming the shot, if the batch breaks the contract of transport.h (a peer process sent it).

@@ -63,6 +63,8 @@ struct Cutter {
 
 /// What a chunk refers to, gathered into arrays of its own.
 struct Packed {
+  std::vector<solver::LampShot> lamps;
+  std::vector<float> webs;
   std::vector<solver::GatherShot> gather;
   std::vector<solver::HemicubeFrame> points;
   std::vector<solver::ParallelShot> parallel;
@@ -110,6 +112,19 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
   }
 }
 
+/// Neighbours that share a web do so here, too.
+void packLamps(const solver::ShotBatch& batch, const Chunk& chunk, Packed& packed) {
+  for (std::size_t i = chunk.first; i < chunk.first + chunk.count; ++i) {
+    auto shot = batch.lamps[i];
+    const auto web = batch.webs.begin() + shot.first_web;
+    const bool known = i > chunk.first && batch.lamps[i - 1].first_web == shot.first_web &&
+                       batch.lamps[i - 1].web_size == shot.web_size;
+    shot.first_web = known ? packed.lamps.back().first_web : static_cast<std::uint32_t>(packed.webs.size());
+    if (!known) packed.webs.insert(packed.webs.end(), web, web + shot.web_size);
+    packed.lamps.push_back(shot);
+  }
+}
+
 }  // namespace
 
 std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, const Workforce& force) {
@@ -120,11 +135,13 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& sce
   for (const auto& shot : batch.gather) total += cost(shot);
   for (const auto& shot : batch.point_lights) total += cost(shot);
   for (const auto& shot : batch.parallel) total += cost(shot);
+  for (const auto& shot : batch.lamps) total += cost(shot);
   const double share = total / static_cast<double>(force.workers);
   Cutter cutter{cost, most, share, share, force, {}};
   cutter.cut(batch.gather, ShotKind::kGather);
   cutter.cut(batch.parallel, ShotKind::kParallel);
   cutter.cut(batch.point_lights, ShotKind::kPoint);
+  cutter.cut(batch.lamps, ShotKind::kLamp);
   cutter.cut(batch.scatter, ShotKind::kScatter);
   return std::move(cutter.chunks);
 }
@@ -137,6 +154,7 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   if (chunk.kind == ShotKind::kPoint) point_lights = std::span(batch.point_lights).subspan(chunk.first, chunk.count);
   if (chunk.kind == ShotKind::kGather) packGather(batch, chunk, packed);
   if (chunk.kind == ShotKind::kParallel) packParallel(batch, chunk, packed);
+  if (chunk.kind == ShotKind::kLamp) packLamps(batch, chunk, packed);
   ChunkBody head;
   head.chunk = id.chunk;
   head.batch = id.batch;
@@ -151,6 +169,8 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   head.views = static_cast<std::uint32_t>(packed.views.size());
   head.receivers = static_cast<std::uint32_t>(packed.receivers.size());
   head.boxes = static_cast<std::uint32_t>(packed.boxes.size());
+  head.lamps = static_cast<std::uint32_t>(packed.lamps.size());
+  head.webs = static_cast<std::uint32_t>(packed.webs.size());
   std::vector<std::byte> body;
   appendValue(body, head);
   appendSpan(body, scatter);
@@ -161,6 +181,8 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   appendSpan(body, std::span<const solver::ParallelView>(packed.views));
   appendSpan(body, std::span<const solver::NodeRun>(packed.receivers));
   appendSpan(body, std::span<const scene::ChangedBox>(packed.boxes));
+  appendSpan(body, std::span<const solver::LampShot>(packed.lamps));
+  appendSpan(body, std::span<const float>(packed.webs));
   return body;
 }
 

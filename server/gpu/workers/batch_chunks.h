@@ -8,7 +8,7 @@
 
 namespace radiosity::gpu {
 
-enum class ShotKind { kScatter, kGather, kPoint, kParallel };
+enum class ShotKind { kScatter, kGather, kPoint, kParallel, kLamp };
 
 /// Consecutive shots of one kind.
 struct Chunk {

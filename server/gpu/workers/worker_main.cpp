@@ -74,10 +74,12 @@ class Worker {
     const auto views = from.values<solver::ParallelView>(head.views);
     const auto receivers = from.values<solver::NodeRun>(head.receivers);
     const auto boxes = from.values<scene::ChangedBox>(head.boxes);
+    const auto lamps = from.values<solver::LampShot>(head.lamps);
+    const auto webs = from.values<float>(head.webs);
     if (!from.good() || !sink_) return fail(ErrorCode::kInternal, "a chunk is cut short or came before the scene");
     const auto mode = static_cast<solver::LinkMode>(head.mode);
-    const ShotSpan shots{mode,         head.flux_scale, scatter, gather,    points,
-                         point_lights, parallel,        views,   receivers, boxes};
+    const ShotSpan shots{mode,     head.flux_scale, scatter,   gather, points, point_lights,
+                         parallel, views,           receivers, boxes,  lamps,  webs};
     std::vector<std::byte> links;
     std::uint64_t taken = 0;
     const auto pack = [&](std::size_t, const solver::LinkSample& sample) {

@@ -46,7 +46,7 @@ struct ChunkBody {
   std::uint32_t mode = 0;
   std::uint32_t measure = 0;  ///< 1: links are wanted, shot by shot, with the report
   std::uint32_t scatter = 0, gather = 0, points = 0, point_lights = 0, parallel = 0, views = 0;
-  std::uint32_t receivers = 0, boxes = 0;
+  std::uint32_t receivers = 0, boxes = 0, lamps = 0, webs = 0;
 };
 struct ChunkDoneBody {
   std::uint64_t chunk = 0;

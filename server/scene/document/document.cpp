@@ -41,7 +41,7 @@ class Loader {
       if (!bytes) return tl::unexpected(bytes.error());
       document_.images.push_back(std::make_shared<const Bytes>(std::move(*bytes)));
     }
-    return {};
+    return photometricFiles();
   }
 
  private:
@@ -110,6 +110,28 @@ class Loader {
     image_bytes_left_ -= length;
     const auto* first = bytes.data() + offset;
     return Bytes(first, first + length);
+  }
+
+  /// Those of EXT_lights_ies that lie in files, or in data URIs, get a buffer each: a document has no bytes elsewhere.
+  Result<void> photometricFiles() {
+    const auto pointer = Json::json_pointer("/extensions/EXT_lights_ies/lights");
+    if (!document_.gltf.contains(pointer)) return {};
+    for (std::size_t i = 0; i < document_.gltf.at(pointer).size(); ++i) {
+      auto& light = document_.gltf.at(pointer)[i];
+      if (!light.contains("uri") || light.contains("bufferView")) continue;
+      auto bytes = fetch(light, place(document_.name, pointer.to_string() + "/" + std::to_string(i) + "/uri"));
+      if (!bytes) return tl::unexpected(bytes.error());
+      if (bytes->empty()) return fail(ErrorCode::kInvalidScene, "is empty", place(document_.name, pointer.to_string()));
+      light.erase("uri");
+      light["bufferView"] = count("bufferViews");
+      if (!light.contains("mimeType")) light["mimeType"] = "application/x-ies-lm-63";
+      const Json view{{"buffer", count("buffers")}, {"byteLength", bytes->size()}};
+      const Json buffer{{"byteLength", bytes->size()}};
+      document_.gltf["bufferViews"].push_back(view);
+      document_.gltf["buffers"].push_back(buffer);
+      document_.buffers.push_back(std::make_shared<const Bytes>(std::move(*bytes)));
+    }
+    return {};
   }
 
   Document& document_;

@@ -14,6 +14,8 @@ namespace radiosity::scene {
 namespace {
 
 constexpr const char* kLights = "KHR_lights_punctual";
+constexpr const char* kAreaLights = "EXT_lights_area";
+constexpr const char* kIesLights = "EXT_lights_ies";
 constexpr const char* kVisibility = "KHR_node_visibility";
 constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
@@ -128,12 +130,19 @@ bool materialiseMaterial(Json& material) {
   return true;
 }
 
-void materialiseLights(Json& gltf) {
+/// The lights of a root extension; null: there are none.
+Json* lightsOf(Json& gltf, const char* name) {
   const auto extensions = gltf.find("extensions");
-  if (extensions == gltf.end() || !extensions->is_object() || !extensions->contains(kLights)) return;
-  auto& extension = (*extensions)[kLights];
-  if (!extension.is_object() || !extension.contains("lights") || !extension["lights"].is_array()) return;
-  for (auto& light : extension["lights"]) {
+  if (extensions == gltf.end() || !extensions->is_object() || !extensions->contains(name)) return nullptr;
+  auto& extension = (*extensions)[name];
+  if (!extension.is_object() || !extension.contains("lights") || !extension["lights"].is_array()) return nullptr;
+  return &extension["lights"];
+}
+
+void materialiseLights(Json& gltf) {
+  auto* lights = lightsOf(gltf, kLights);
+  if (lights == nullptr) return;
+  for (auto& light : *lights) {
     if (!light.is_object()) continue;
     setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
     setDefault(light, "intensity", 1.0);
@@ -141,6 +150,30 @@ void materialiseLights(Json& gltf) {
     setDefault(light["spot"], "innerConeAngle", 0.0);
     setDefault(light["spot"], "outerConeAngle", std::numbers::pi / 4.0);
   }
+}
+
+void materialiseAreaLights(Json& gltf) {
+  auto* lights = lightsOf(gltf, kAreaLights);
+  if (lights == nullptr) return;
+  for (auto& light : *lights) {
+    if (!light.is_object()) continue;
+    setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
+    setDefault(light, "intensity", 1000.0);
+    setDefault(light, "size", 1.0);
+    if (light.value("type", Json()) != "rect") continue;
+    setDefault(light, "rect", Json::object());
+    if (light["rect"].is_object()) setDefault(light["rect"], "aspect", 1.0);
+  }
+}
+
+/// Of a node whose light has a web: colour and strength are its own.
+void materialiseIes(Json& node) {
+  const auto extensions = node.find("extensions");
+  if (extensions == node.end() || !extensions->is_object() || !extensions->contains(kIesLights)) return;
+  auto& light = (*extensions)[kIesLights];
+  if (!light.is_object()) return;
+  setDefault(light, "multiplier", 1.0);
+  setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
 }
 
 void markUsed(Json& gltf, const char* extension) {
@@ -174,12 +207,14 @@ void materialiseDefaults(Json& gltf, const TouchedParts& parts) {
     if (!node.is_object()) return;
     materialiseTransform(node);
     visibility |= materialiseVisibility(node);
+    materialiseIes(node);
   });
   if (visibility) markUsed(gltf, kVisibility);
   materialiseScenes(gltf);
   forEach(gltf, "materials", parts.all, parts.materials,
           [&](Json& material) { strength |= materialiseMaterial(material); });
   materialiseLights(gltf);
+  materialiseAreaLights(gltf);
   if (strength) markUsed(gltf, kEmissiveStrength);
 }
 

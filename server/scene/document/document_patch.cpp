@@ -17,7 +17,9 @@ bool isOneOf(const std::string& token, std::initializer_list<std::string_view> n
 
 /// Length of the path of an array whose elements others refer to by index, when `path` is in one; else 0.
 std::size_t indexedArrayDepth(const Tokens& path) {
-  if (path.size() > 2 && path[0] == "extensions" && path[1] == "KHR_lights_punctual" && path[2] == "lights") return 3;
+  if (path.size() > 2 && path[0] == "extensions" && path[2] == "lights" &&
+      isOneOf(path[1], {"EXT_lights_area", "EXT_lights_ies", "KHR_lights_punctual"}))
+    return 3;
   const bool listed = isOneOf(path[0], {"accessors", "animations", "bufferViews", "buffers", "cameras", "images",
                                         "materials", "meshes", "nodes", "samplers", "scenes", "skins", "textures"});
   return listed ? 1 : 0;

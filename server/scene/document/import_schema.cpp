@@ -31,9 +31,11 @@ enum class Kind {
 /// What an index points into.
 enum class Ref {
   kAccessors,
+  kAreaLights,
   kBufferViews,
   kBuffers,
   kCameras,
+  kIesLights,
   kImages,
   kLights,
   kMaterials,
@@ -47,8 +49,13 @@ enum class Ref {
 };
 
 constexpr std::array<const char*, static_cast<std::size_t>(Ref::kCount)> kRefPointers = {
-    "/accessors", "/bufferViews", "/buffers", "/cameras",  "/images", "/extensions/KHR_lights_punctual/lights",
-    "/materials", "/meshes",      "/nodes",   "/samplers", "/scenes", "/skins",
+    "/accessors",   "/extensions/EXT_lights_area/lights",
+    "/bufferViews", "/buffers",
+    "/cameras",     "/extensions/EXT_lights_ies/lights",
+    "/images",      "/extensions/KHR_lights_punctual/lights",
+    "/materials",   "/meshes",
+    "/nodes",       "/samplers",
+    "/scenes",      "/skins",
     "/textures"};
 
 // Scene values are 32-bit floats: a double that does not fit would become infinite.
@@ -110,6 +117,10 @@ constexpr std::string_view kAccessorTypes[] = {"SCALAR", "VEC2", "VEC3", "VEC4",
 constexpr std::string_view kAlphaModes[] = {"OPAQUE", "MASK", "BLEND"};
 constexpr std::string_view kCameraTypes[] = {"perspective", "orthographic"};
 constexpr std::string_view kLightTypes[] = {"point", "spot", "directional"};
+constexpr std::string_view kAreaTypes[] = {"rect", "disk"};
+constexpr std::string_view kPhotometricTypes[] = {"application/x-ies-lm-63", "application/x-eulumdat"};
+// Metres: of the size of a lamp. One that is as large as a country is a mistake.
+constexpr double kMostSize = 1e6;
 
 constexpr Member kAsset[] = {req(string("version")), string("minVersion"), string("generator"), string("copyright")};
 constexpr Member kFallback[] = {boolean("fallback")};
@@ -158,11 +169,15 @@ constexpr Member kMesh[] = {string("name"), req(objects("primitives", kPrimitive
                             numbers("weights", 0, -kMostWeight, kMostWeight)};
 
 constexpr Member kNodeLight[] = {req(index("light", Ref::kLights))};
+constexpr Member kNodeAreaLight[] = {req(index("light", Ref::kAreaLights))};
+constexpr Member kNodeIesLight[] = {req(index("light", Ref::kIesLights)), number("multiplier", 0),
+                                    numbers("color", 3, 0)};
 constexpr Member kNodeVisibility[] = {boolean("visible")};
 constexpr Member kInstancing[] = {req(indexMap("attributes", Ref::kAccessors))};
-constexpr Member kNodeExtensions[] = {object("KHR_lights_punctual", kNodeLight),
-                                      object("KHR_node_visibility", kNodeVisibility),
-                                      object("EXT_mesh_gpu_instancing", kInstancing)};
+constexpr Member kNodeExtensions[] = {
+    object("KHR_lights_punctual", kNodeLight), object("EXT_lights_area", kNodeAreaLight),
+    object("EXT_lights_ies", kNodeIesLight), object("KHR_node_visibility", kNodeVisibility),
+    object("EXT_mesh_gpu_instancing", kInstancing)};
 constexpr Member kNode[] = {string("name"),
                             index("camera", Ref::kCameras),
                             indices("children", Ref::kNodes),
@@ -226,7 +241,15 @@ constexpr Member kLight[] = {string("name"),         req(oneOf("type", kLightTyp
                              numbers("color", 3, 0), number("intensity", 0),
                              number("range", 0),     object("spot", kSpot)};
 constexpr Member kLights[] = {objects("lights", kLight)};
-constexpr Member kRootExtensions[] = {object("KHR_lights_punctual", kLights)};
+constexpr Member kRectangle[] = {number("aspect", 0, kMostSize)};
+constexpr Member kAreaLight[] = {string("name"),         req(oneOf("type", kAreaTypes)), numbers("color", 3, 0),
+                                 number("intensity", 0), number("size", 0, kMostSize),   object("rect", kRectangle)};
+constexpr Member kAreaLights[] = {objects("lights", kAreaLight)};
+constexpr Member kIesLight[] = {string("name"), string("uri"), index("bufferView", Ref::kBufferViews),
+                                oneOf("mimeType", kPhotometricTypes)};
+constexpr Member kIesLights[] = {objects("lights", kIesLight)};
+constexpr Member kRootExtensions[] = {object("KHR_lights_punctual", kLights), object("EXT_lights_area", kAreaLights),
+                                      object("EXT_lights_ies", kIesLights)};
 constexpr Member kRoot[] = {req(object("asset", kAsset)),
                             strings("extensionsUsed"),
                             strings("extensionsRequired"),
@@ -416,7 +439,9 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 13> kSupported = {"EXT_mesh_gpu_instancing",
+constexpr std::array<std::string_view, 15> kSupported = {"EXT_lights_area",
+                                                         "EXT_lights_ies",
+                                                         "EXT_mesh_gpu_instancing",
                                                          "EXT_meshopt_compression",
                                                          "EXT_texture_webp",
                                                          "KHR_draco_mesh_compression",

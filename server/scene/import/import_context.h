@@ -1,6 +1,7 @@
 // What the parts of the importer share while one document is read. Lives for one importScene call, on its thread.
 #pragma once
 
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,7 +22,9 @@ struct ImportContext {
   const ImportRecord* before;  ///< of the document before an edit; null: none, or not known
   DecodedImages& images;       ///< gets those that are used
   Scene& scene;
-  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images (scene_memory.h)
+  ReadWebs& webs;                        ///< gets those that are used
+  std::uint64_t claimed_bytes = 0;       ///< of memory, by all but images (scene_memory.h)
+  std::set<std::string> webs_told = {};  ///< pointers of the lights whose warnings were told
 
   void warn(std::string_view pointer, std::string_view what) {
     scene.warnings.push_back(place(document.name, pointer) + ": " + std::string(what));

@@ -141,6 +141,10 @@ void warnCameras(ImportContext& context) {
 void warnLights(ImportContext& context) {
   for (std::size_t i = 0; i < context.model.lights.size(); ++i) {
     const auto& light = context.model.lights[i];
+    const auto& json = context.document.gltf["extensions"]["KHR_lights_punctual"]["lights"][i];
+    if (light.type == "directional" && json.value("extras", Json()).contains("radiosityRadius"))
+      context.warn("/extensions/KHR_lights_punctual/lights/" + std::to_string(i) + "/extras/radiosityRadius",
+                   "means nothing to a directional light");
     if (light.type != "spot") continue;
     const auto pointer = "/extensions/KHR_lights_punctual/lights/" + std::to_string(i) + "/spot/";
     if (light.spot.outerConeAngle > std::numbers::pi / 2 + 1e-6)

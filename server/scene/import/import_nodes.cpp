@@ -8,6 +8,7 @@
 
 #include "common/task.h"
 #include "server/scene/import/import_instancing.h"
+#include "server/scene/import/import_lights.h"
 #include "server/scene/import/import_lint.h"
 #include "server/scene/import/import_mesh.h"
 #include "server/scene/import/node_transform.h"
@@ -16,7 +17,6 @@ namespace radiosity::scene {
 namespace {
 
 constexpr double kMaxSkyNits = 1e12;
-constexpr double kMaxConeRad = std::numbers::pi / 2;
 constexpr double kMinTexelScale = 1.0 / 64.0, kMaxTexelScale = 64.0;
 
 class NodeWalk {
@@ -81,9 +81,8 @@ class NodeWalk {
     if (node.camera >= 0) {
       if (auto ok = placeCamera(static_cast<std::size_t>(node.camera), cameraPose(at.parent, node)); !ok) return ok;
     }
-    if (const auto* light = extensionOf(json, "KHR_lights_punctual"); light != nullptr && visible) {
-      if (auto ok = placeLight((*light)["light"].get<std::size_t>(), world); !ok) return ok;
-    }
+    if (visible)
+      if (auto ok = placeLights(context_, json, world, pointer_); !ok) return ok;
     for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
       stack_.push_back({*child, world, visible, *texel_scale});
     }
@@ -171,41 +170,6 @@ class NodeWalk {
     camera.aspect = source.perspective.aspectRatio;
     camera.znear = source.perspective.znear;
     context_.scene.cameras.push_back(std::move(camera));
-    return {};
-  }
-
-  Result<void> placeLight(std::size_t index, const glm::dmat4& world) {
-    const auto& source = context_.model.lights[index];
-    const auto pointer = "/extensions/KHR_lights_punctual/lights/" + std::to_string(index);
-    PunctualLight light;
-    if (source.type == "spot") {
-      light.kind = LightKind::kSpot;
-    } else if (source.type == "directional") {
-      light.kind = LightKind::kDirectional;
-    } else if (source.type != "point") {
-      return context_.bad(pointer + "/type", "must be point, spot or directional");
-    }
-    light.position = glm::dvec3(world[3]);
-    const auto axis = -glm::dvec3(world[2]);
-    if (glm::length(axis) > 0) light.direction = glm::normalize(axis);
-    const auto color = source.color.empty() ? std::vector<double>{1, 1, 1} : source.color;
-    for (int c = 0; c < 3; ++c) {
-      light.intensity[c] = static_cast<float>(color[static_cast<std::size_t>(c)] * source.intensity);
-      if (!std::isfinite(light.intensity[c])) return context_.bad(pointer + "/intensity", "is too bright to hold");
-    }
-    light.range = source.range;
-    light.inner_cone_rad = source.spot.innerConeAngle;
-    light.outer_cone_rad = source.spot.outerConeAngle;
-    if (light.kind == LightKind::kSpot) {
-      if (!(light.outer_cone_rad > 0)) return context_.bad(pointer + "/spot/outerConeAngle", "must be above 0");
-      // What is odd about them is said once a light (import_lint.h).
-      light.outer_cone_rad = std::min(light.outer_cone_rad, kMaxConeRad);
-      light.inner_cone_rad = std::min(light.inner_cone_rad, light.outer_cone_rad);
-    }
-    if (context_.scene.lights.size() >= context_.limits.max_nodes) {
-      return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_nodes) + " lights");
-    }
-    context_.scene.lights.push_back(light);
     return {};
   }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/bytes.h"
+#include "server/scene/import/photometric_file.h"
 #include "server/scene/values/scene.h"
 
 namespace radiosity::scene {
@@ -26,10 +27,25 @@ struct DecodedImage {
 /// By the bytes that they are decoded from, which so stay those of that image.
 using DecodedImages = std::map<SharedBytes, DecodedImage>;
 
+/// A photometric file, by where its bytes lie.
+struct WebKey {
+  SharedBytes buffer;
+  std::size_t offset = 0, length = 0;
+
+  auto operator<=>(const WebKey&) const = default;
+};
+struct ReadWeb {
+  SharedWeb web;
+  WebFrame frame = WebFrame::kC;
+  std::vector<std::string> warnings;
+};
+using ReadWebs = std::map<WebKey, std::shared_ptr<const ReadWeb>>;
+
 struct ImportRecord {
   std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
   std::vector<tinygltf::Material> materials;
   DecodedImages images;              ///< that the materials use
+  ReadWebs webs;                     ///< that the lights use
   std::uint64_t claimed_bytes = 0;   ///< of memory, by all but images
   std::set<std::string> extensions;  ///< that are used anywhere but in materials
   Scene scene;                       ///< shares what is large with the one that was imported

@@ -220,18 +220,33 @@ class Probe {
     return length > 0.0 && isFree(at, way / length, static_cast<float>(length - kLift));
   }
 
+  /// Of one with a size, any of its points.
+  [[nodiscard]] static glm::dvec3 pointOf(const PunctualLight& light, Random& random) {
+    if (!(light.half.x > 0.0) || light.kind == LightKind::kDirectional) return light.position;
+    if (light.kind == LightKind::kPoint)
+      return light.position + light.half.x * around({0, 1, 0}, 1.0 - 2.0 * random(), random());
+    const auto up = glm::cross(light.direction, light.across);
+    if (light.kind == LightKind::kRectangle)
+      return light.position + (2.0 * random() - 1.0) * light.half.x * light.across +
+             (2.0 * random() - 1.0) * light.half.y * up;
+    const auto rim = around(light.direction, 0.0, random());
+    return light.position + light.half.x * std::sqrt(random()) * rim;
+  }
+
   [[nodiscard]] bool seesLight(const Place& at, const Near& near, Random& random) const {
     const bool any = near.lights.empty() || random() < 0.5;
     const auto& light =
         scene_.lights[any ? drawIndex(scene_.lights, random) : near.lights[drawIndex(near.lights, random)]];
     if (light.kind == LightKind::kDirectional)
       return glm::dot(light.direction, at.normal) < 0.0 && isFree(at, -light.direction, kFar);
-    const glm::dvec3 way = light.position - at.point;
+    const glm::dvec3 way = pointOf(light, random) - at.point;
     const double length = glm::length(way);
     if (!(length > 0.0) || glm::dot(way, at.normal) <= 0.0 || (light.range > 0.0 && length >= light.range))
       return false;
     if (light.kind == LightKind::kSpot && -glm::dot(way, light.direction) < length * std::cos(light.outer_cone_rad))
       return false;
+    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisc;
+    if (is_flat && glm::dot(way, light.direction) >= 0.0) return false;
     return isFree(at, way / length, static_cast<float>(length));
   }
 
@@ -327,10 +342,12 @@ class Probe {
     const auto& light = scene_.lights[drawIndex(scene_.lights, random)];
     if (light.kind == LightKind::kDirectional) return;  // the paths that look for it find it
     const bool spot = light.kind == LightKind::kSpot;
-    const double least = spot ? std::cos(std::min(light.outer_cone_rad, M_PI)) : -1.0;
+    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisc;
+    const double least = spot ? std::cos(std::min(light.outer_cone_rad, M_PI)) : is_flat ? 0.0 : -1.0;
     const auto direction =
-        around(spot ? light.direction : glm::dvec3(0, 1, 0), 1.0 - random() * (1.0 - least), random());
-    follow({light.position, direction, kNone}, direction, random);
+        around(spot || is_flat ? light.direction : glm::dvec3(0, 1, 0), 1.0 - random() * (1.0 - least), random());
+    const auto from = light.half.x > 0.0 ? pointOf(light, random) : light.position;
+    follow({from, direction, kNone}, direction, random);
   }
 
   void follow(Place at, glm::dvec3 direction, Random& random) {
@@ -420,6 +437,7 @@ std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3&
     if (!isBright(light.intensity)) continue;
     light.position = (light.position - centre) / scale;
     light.range /= scale;
+    light.half /= scale;
     lights.push_back(light);
   }
   return lights;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/shared_list.h"
+#include "server/scene/values/light_web.h"
 
 namespace radiosity::scene {
 
@@ -97,17 +98,23 @@ struct Camera {
   double znear = 0.01;
 };
 
-enum class LightKind { kPoint, kSpot, kDirectional };
+enum class LightKind { kPoint, kSpot, kDirectional, kRectangle, kDisc, kWeb };
 
-/// KHR_lights_punctual, in world space.
+/// A light that is no surface, in world space: KHR_lights_punctual, EXT_lights_area, EXT_lights_ies.
 struct PunctualLight {
   LightKind kind = LightKind::kPoint;
   glm::dvec3 position{0.0};
   glm::dvec3 direction{0.0, 0.0, -1.0};
-  glm::vec3 intensity{0.0F};  ///< candela (point, spot) or lux (directional), colour included
-  double range = 0.0;         ///< metres; 0: infinite
+  /// Colour included. Candela (point, spot), lux (directional), nits (rectangle, disc), or a factor of a web's candela.
+  glm::vec3 intensity{0.0F};
+  double range = 0.0;  ///< metres; 0: infinite
   double inner_cone_rad = 0.0;
   double outer_cone_rad = 0.785398163;
+  glm::dvec3 across{1.0, 0.0, 0.0};  ///< of a rectangle, along its width; of a web, where the azimuth is 0
+  /// Metres, of a rectangle's width and height. The first is the radius of a disc, of the ball that a point light is,
+  /// and of the disc that a spot is; 0: they have no size.
+  glm::dvec2 half{0.0};
+  SharedWeb web = {};
 
   bool operator==(const PunctualLight&) const = default;
 };

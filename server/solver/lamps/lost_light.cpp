@@ -6,8 +6,10 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <utility>
 
+#include "server/solver/lamps/lamp_of_light.h"
 #include "server/solver/math/sampling.h"
 
 namespace radiosity::solver {
@@ -102,6 +104,14 @@ LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, std::uint32_
   const auto at = sobol4(index, key);
   if (light.kind == scene::LightKind::kDirectional) return fromFar(-light.direction, at.x, at.y);
   LeafRays::Place from;
+  if (hasSizeOrWeb(light)) {
+    // The cone only weighs rays within the angle that is asked for below, too.
+    const Lamp lamp{lampShape(patches_, light, {}), light.web ? std::span(light.web->table) : std::span<const float>()};
+    const auto ray = lampRay(lamp, {at.x, at.y, at.z, at.w});
+    from.position = glm::dvec3(ray.origin);
+    if (light.kind != scene::LightKind::kSpot) return {from, glm::dvec3(ray.direction)};
+    return {from, inCap(light.direction, std::cos(light.outer_cone_rad), at.x, at.y)};
+  }
   from.position = (light.position - patches_.centre) / patches_.scale;
   const double least = light.kind == scene::LightKind::kSpot ? std::cos(light.outer_cone_rad) : -1.0;
   return {from, inCap(light.direction, least, at.x, at.y)};

@@ -8,8 +8,10 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <unordered_map>
 
+#include "server/solver/lamps/lamp_of_light.h"
 #include "server/solver/math/sampling.h"
 
 namespace radiosity::solver {
@@ -130,7 +132,13 @@ double totalFlux(const scene::PatchScene& patches, const LightSources& sources) 
 
 bool PunctualLights::Source::sameShape(const Source& other) const {
   return kind == other.kind && position == other.position && direction == other.direction &&
-         cone_scale == other.cone_scale && cone_offset == other.cone_offset && range == other.range;
+         cone_scale == other.cone_scale && cone_offset == other.cone_offset && range == other.range &&
+         shape == other.shape && web_key == other.web_key;
+}
+
+Lamp PunctualLights::Source::lamp() const {
+  static const std::array<float, 7> black{2.0F, 1.0F, 0.0F, 180.0F, 0.0F, 0.0F, 0.0F};
+  return {shape, web ? std::span<const float>(*web) : std::span<const float>(black)};
 }
 
 std::uint64_t PunctualLights::Source::shapeKey() const {
@@ -138,6 +146,12 @@ std::uint64_t PunctualLights::Source::shapeKey() const {
   for (const float value :
        {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale, cone_offset, range}) {
     key = mixKeys(key, std::bit_cast<std::uint32_t>(value));
+  }
+  if (kind != Kind::kLamp) return key;
+  key = mixKeys(mixKeys(key, web_key), static_cast<std::uint64_t>(shape.kind));
+  for (const float value : {shape.axis.x, shape.axis.y, shape.axis.z, shape.across.x, shape.across.y, shape.across.z,
+                            shape.half.x, shape.half.y}) {
+    key = mixKeys(key, std::bit_cast<std::uint32_t>(value + 0.0F));  // -0 becomes 0
   }
   return key;
 }
@@ -167,6 +181,7 @@ PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patche
     source.flux_per_intensity =
         coneSolidAngle(static_cast<double>(source.cone_scale), static_cast<double>(source.cone_offset));
   }
+  if (hasSizeOrWeb(light)) return makeLamp(patches, light, source);
   const double range = light.range / patches.scale;
   const double largest = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
   if (largest > kFar) {
@@ -180,6 +195,35 @@ PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patche
   }
   source.position = glm::vec3(position);
   if (range > 0.0) source.range = std::max(static_cast<float>(range), std::numeric_limits<float>::min());
+  return source;
+}
+
+/// `spot`: what the light would be without a size.
+PunctualLights::Source PunctualLights::makeLamp(const scene::PatchScene& patches, const scene::PunctualLight& light,
+                                                const Source& spot) const {
+  Source source;
+  source.kind = Source::Kind::kLamp;
+  source.shape = lampShape(patches, light, {spot.cone_scale, spot.cone_offset});
+  const double unit2 = patches.scale * patches.scale;
+  source.intensity = glm::dvec3(light.intensity) * (source.shape.isFlat() ? lampArea(light) / unit2 : 1.0 / unit2);
+  if (light.web) {
+    source.web = {light.web.shared(), &light.web->table};
+    source.web_key = light.web->key;
+  }
+  source.flux_per_intensity = source.shape.kind == LampShape::Kind::kSpotDisc
+                                  ? spot.flux_per_intensity
+                                  : lampFlux(source.shape, light.web ? light.web->lumens : 0.0);
+  const glm::dvec3 position = (light.position - patches.centre) / patches.scale;
+  const double largest = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
+  if (largest > kFar) {
+    const glm::dvec3 towards = glm::normalize(position / largest);
+    const double distance = largest * glm::length(position / largest);
+    const auto lamp = source.lamp();
+    const double strength = static_cast<double>(lamp.strength(glm::vec3(-towards))) * lamp.fade(distance);
+    return makeDirectional(source.intensity * (strength / distance / distance), towards);
+  }
+  source.position = source.shape.centre;
+  source.direction = source.shape.axis;
   return source;
 }
 
@@ -209,6 +253,7 @@ std::vector<PunctualLights::Source> PunctualLights::makeSources(const scene::Pat
   Shapes shapes;
   const auto add = [&](Source source) {
     if (channelSum(source.intensity) <= 0.0) return;
+    if (source.kind == Source::Kind::kLamp && source.flux_per_intensity <= 0.0) return;  // its web is black
     source.key = mixKeys(settings_.seed, source.shapeKey());
     if (const auto same = shapes.find(made, source)) {
       made[*same].intensity += source.intensity;  // two lights in one place shine as one
@@ -312,6 +357,33 @@ void PunctualLights::addPoint(const Task& task, ShotBatch& batch) const {
   }
 }
 
+void PunctualLights::addLamp(const Task& task, ShotBatch& batch) const {
+  const auto& source = task.source;
+  const std::uint64_t key = mixKeys(source.key, task.half);
+  const auto lamp = source.lamp();
+  LampShot shot;
+  shot.shape = lamp.shape;
+  if (lamp.shape.kind == LampShape::Kind::kWeb) {
+    shot.first_web = static_cast<std::uint32_t>(batch.webs.size());
+    shot.web_size = static_cast<std::uint32_t>(lamp.web.size());
+    batch.webs.insert(batch.webs.end(), lamp.web.begin(), lamp.web.end());
+  }
+  shot.half = task.half;
+  shot.key = mixKeys(key, 3);
+  const glm::dvec3 weighed = task.intensity / (2.0 * settings_.images);
+  shot.intensity = channels(weighed);
+  shot.emitted = channels(weighed * source.flux_per_intensity);
+  for (std::uint32_t image = 0; image < settings_.images; ++image) {
+    const std::uint32_t index = task.sequence * settings_.images + image;
+    shot.receivers = receiverPoints(index, mixKeys(key, 1));
+    for (std::uint32_t p = 0; p < kMaxReceiverPoints; ++p) {
+      const auto at = sobol4(index * static_cast<std::uint32_t>(kMaxReceiverPoints) + p, mixKeys(key, 2));
+      shot.at[p] = glm::vec2(at.x, at.y);
+    }
+    batch.lamps.push_back(shot);
+  }
+}
+
 void PunctualLights::addDirectional(const Task& task, ShotBatch& batch) const {
   const auto& source = task.source;
   const std::uint64_t key = mixKeys(source.key, task.half);
@@ -371,6 +443,8 @@ void PunctualLights::addTask(const Task& task, ShotBatch& batch) const {
     addSky(task, batch);
   } else if (task.source.kind == Source::Kind::kDirectional) {
     addDirectional(task, batch);
+  } else if (task.source.kind == Source::Kind::kLamp) {
+    addLamp(task, batch);
   } else {
     addPoint(task, batch);
   }
@@ -383,7 +457,7 @@ void PunctualLights::addSample(const Source& source, std::uint32_t sequence, std
 
 void PunctualLights::addSlice(std::uint32_t rounds, ShotBatch& batch) {
   if (next_ >= pending_.size()) plan(rounds);
-  const auto images = [&] { return batch.point_lights.size() + batch.views.size(); };
+  const auto images = [&] { return batch.point_lights.size() + batch.views.size() + batch.lamps.size(); };
   for (; next_ < pending_.size() && images() < settings_.images_a_slice; ++next_) {
     addTask(pending_[next_], batch);
   }

@@ -1,4 +1,5 @@
-// Lights without extent (KHR_lights_punctual) and the sky, as shots of gathered direct light.
+// Lights that are no surfaces (KHR_lights_punctual, those with a size or a web, the sky) as shots of gathered direct
+// light.
 //
 // Every round plays one sequence of shots for each source: the same sequence numbers give the same shots, so an edit of
 // a source replays what was delivered, with the difference of intensities, and cancels it to the last bit. Owned by the
@@ -8,9 +9,11 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <vector>
 
 #include "server/scene/values/scene.h"
+#include "server/solver/transport/lamp_shape.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
@@ -41,19 +44,30 @@ class PunctualLights {
  public:
   /// One light, or one hemisphere of the sky.
   struct Source {
-    enum class Kind { kPoint, kSpot, kDirectional, kSky } kind = Kind::kPoint;
+    enum class Kind { kPoint, kSpot, kDirectional, kSky, kLamp } kind = Kind::kPoint;
     glm::vec3 position{0.0F};   ///< unit box
     glm::vec3 direction{0.0F};  ///< axis of a spot; towards the light, or to the middle of the hemisphere
     float cone_scale = 0.0F, cone_offset = 1.0F, range = 0.0F;
-    glm::dvec3 intensity{0.0};        ///< lux unit^2 / sr; lux; of the sky radiance, nits
-    double flux_per_intensity = 0.0;  ///< unit^2 sr; unit^2
-    std::uint64_t key = 0;            ///< of its sample sequences
-    glm::dvec3 delivered{0.0};        ///< intensity of every sequence played
-    std::uint32_t sequences = 0;      ///< played so far: 0 .. sequences - 1
+    glm::dvec3 intensity{0.0};                      ///< lux unit^2 / sr; lux; of the sky radiance, nits
+    double flux_per_intensity = 0.0;                ///< unit^2 sr; unit^2
+    std::uint64_t key = 0;                          ///< of its sample sequences
+    glm::dvec3 delivered{0.0};                      ///< intensity of every sequence played
+    std::uint32_t sequences = 0;                    ///< played so far: 0 .. sequences - 1
+    LampShape shape;                                ///< of a kLamp
+    std::shared_ptr<const std::vector<float>> web;  ///< of a kLamp that has one: LightWeb::table
+    std::uint64_t web_key = 0;
 
     /// All but intensity: what sample sequences depend on.
     [[nodiscard]] bool sameShape(const Source& other) const;
     [[nodiscard]] std::uint64_t shapeKey() const;
+    /// Of a kLamp. Where the web is not known any more (a dark lamp of before a restart) it is black.
+    [[nodiscard]] Lamp lamp() const;
+
+    template <typename Archive, typename Self>
+    static void visit(Archive& archive, Self& self) {
+      archive(self.kind, self.position, self.direction, self.cone_scale, self.cone_offset, self.range, self.intensity,
+              self.flux_per_intensity, self.key, self.delivered, self.sequences, self.shape, self.web, self.web_key);
+    }
   };
 
   PunctualLights(const scene::PatchScene& patches, const LightSources& sources, PunctualSettings settings);
@@ -85,6 +99,9 @@ class PunctualLights {
 
  private:
   [[nodiscard]] Source makeLight(const scene::PatchScene& patches, const scene::PunctualLight& light) const;
+  /// With a size or a web.
+  [[nodiscard]] Source makeLamp(const scene::PatchScene& patches, const scene::PunctualLight& light,
+                                const Source& spot) const;
   [[nodiscard]] Source makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const;
   [[nodiscard]] Source makeSky(const glm::vec3& radiance, float up) const;
   /// What a sequence of one source delivers to one half.
@@ -92,11 +109,17 @@ class PunctualLights {
     Source source;
     std::uint32_t sequence = 0, half = 0;
     glm::dvec3 intensity{0.0};
+
+    template <typename Archive, typename Self>
+    static void visit(Archive& archive, Self& self) {
+      archive(self.source, self.sequence, self.half, self.intensity);
+    }
   };
   void plan(std::uint32_t rounds);
   void addTasks(const Source& source, std::uint32_t sequence, const glm::dvec3& intensity);
   void addTask(const Task& task, ShotBatch& batch) const;
   void addPoint(const Task& task, ShotBatch& batch) const;
+  void addLamp(const Task& task, ShotBatch& batch) const;
   void addDirectional(const Task& task, ShotBatch& batch) const;
   void addSky(const Task& task, ShotBatch& batch) const;
 

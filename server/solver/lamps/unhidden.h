@@ -1,6 +1,7 @@
 // What a lamp brings to a place when nothing stands between. Pure functions of values; any thread.
 #pragma once
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 
@@ -13,8 +14,10 @@ namespace radiosity::solver {
 /// Form factor of the whole lamp; 0 behind it, and in its plane.
 [[nodiscard]] double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place);
 
-/// The way from a place to a source, whose light arrives where nothing lies on it.
-[[nodiscard]] glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place);
+/// The way from a place to a source, whose light arrives where nothing lies on it. `at`: which point of a lamp with a
+/// size, uniform in [0, 1)^2.
+[[nodiscard]] glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place,
+                               const glm::dvec2& at);
 
 /// Irradiance for an intensity of one; 0 of the sky, which rays see where they end.
 [[nodiscard]] double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place);

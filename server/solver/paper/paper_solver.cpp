@@ -29,6 +29,7 @@ glm::dvec3 emittedBy(const ShotBatch& batch) {
   glm::dvec3 sum(0.0);
   for (const auto& shot : batch.point_lights) sum += glm::dvec3(shot.emitted[0], shot.emitted[1], shot.emitted[2]);
   for (const auto& shot : batch.parallel) sum += glm::dvec3(shot.emitted[0], shot.emitted[1], shot.emitted[2]);
+  for (const auto& shot : batch.lamps) sum += glm::dvec3(shot.emitted[0], shot.emitted[1], shot.emitted[2]);
   return sum;
 }
 

@@ -28,7 +28,15 @@ ShadingEmitter emitterOf(const LightPolygon& light) {
 ShadingEmitter emitterOf(const PunctualLights::Source& source) {
   using Kind = PunctualLights::Source::Kind;
   ShadingEmitter emitter;
-  const bool is_point = source.kind == Kind::kPoint || source.kind == Kind::kSpot;
+  if (source.kind == Kind::kLamp && source.shape.isFlat()) {
+    emitter.kind = ShadingEmitter::Kind::kPatches;
+    for (std::uint32_t k = 0; k < kNodeLeaves; ++k) {
+      const glm::dvec2 at((k % 4 + 0.5) / 4.0, (k / 4 + 0.5) / 4.0);
+      emitter.patches.push_back({source.shape.pointOn(at), glm::dvec3(source.shape.axis), 1.0});
+    }
+    return emitter;
+  }
+  const bool is_point = source.kind == Kind::kLamp || source.kind == Kind::kPoint || source.kind == Kind::kSpot;
   emitter.kind = is_point                    ? ShadingEmitter::Kind::kPoint
                  : source.kind == Kind::kSky ? ShadingEmitter::Kind::kSky
                                              : ShadingEmitter::Kind::kDirection;

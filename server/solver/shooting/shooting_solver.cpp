@@ -26,6 +26,7 @@ void addEmitted(const ShotBatch& batch, std::array<double, 3>& sum) {
   for (std::size_t c = 0; c < 3; ++c) {
     for (const auto& shot : batch.point_lights) sum[c] += shot.emitted[c];
     for (const auto& shot : batch.parallel) sum[c] += shot.emitted[c];
+    for (const auto& shot : batch.lamps) sum[c] += shot.emitted[c];
   }
 }
 

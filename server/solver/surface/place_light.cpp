@@ -21,6 +21,8 @@ constexpr std::uint32_t kFirstLooks = 8, kAllLooks = PlaceLight::kMostLooks;
 static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPacket == 0);
 /// Where the first agree the others are asked with this chance.
 constexpr double kAskAgain = 0.25;
+/// Points of a lamp that is no surface.
+constexpr std::uint32_t kLampLooks = 32;
 /// Ways to a lamp end so far before it (unit box), well above the rounding of positions.
 constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
@@ -136,7 +138,11 @@ glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
   if (many_) sum += fromSomeLamps(spot, key);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const auto& place = spot.place;
-    const auto way = wayTo(sources_[i], place);
+    if (sources_[i].kind == PunctualLights::Source::Kind::kLamp) {
+      sum += fromLampOfSize(sources_[i].lamp(), spot, mixKeys(key, ~i)) * sources_[i].intensity;
+      continue;
+    }
+    const auto way = wayTo(sources_[i], place, {});
     if (glm::dot(place.normal, way) <= 0.0) continue;
     auto shaded = place;
     shaded.normal = spot.shading;
@@ -145,6 +151,28 @@ glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
       sum += arrives * sources_[i].intensity;
   }
   return sum;
+}
+
+/// For an intensity of one, by some of its points.
+double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const {
+  const auto& place = spot.place;
+  const Sobol4 draws(key);
+  const auto whole = static_cast<float>(wholeIrradiance(lamp, place.position, spot.shading));
+  const std::uint32_t count = lamp.shape.kind == LampShape::Kind::kWeb ? 1 : kLampLooks;
+  LampLooks looks;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const auto draw = draws(k);
+    const auto point = lampPoint(lamp, place.position, spot.shading, {draw.x, draw.y});
+    const auto brings = static_cast<float>(point.brings);
+    const float all = lamp.shape.hasClosedForm() ? whole : brings;
+    if (!(brings > 0.0F) || glm::dot(place.normal, point.position - place.position) <= 0.0) {
+      looks.pass(lamp.shape.hasClosedForm() ? whole : 0.0F);
+      continue;
+    }
+    looks.ask(all, brings);
+    if (isOpen(place, point.position, glm::dvec3(0.0), mixKeys(key, k))) looks.see(all, brings);
+  }
+  return static_cast<double>(looks.irradiance(count));
 }
 
 /// For an emission of one: the exact form factor of all of it, times the part of that which is seen.

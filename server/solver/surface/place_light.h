@@ -62,6 +62,7 @@ class PlaceLight {
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
   [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] double fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] glm::dvec3 fromSomeLamps(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] double seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,

@@ -16,12 +16,16 @@ struct ShotCost {
 
   static constexpr double kTrianglePixels = 4.0;
   static constexpr double kReceiverPixels = 0.5, kNamedPixels = 5000.0;
+  static constexpr double kLampPixels = 20.0;  ///< a ray, and a closed form in double precision
   [[nodiscard]] double operator()(const ScatterShot& shot) const { return hemicube(shot.resolution); }
   [[nodiscard]] double operator()(const GatherShot& shot) const {
     const double looks = shot.run_count > 0 ? kNamedPixels : kReceiverPixels * receivers;
     return looks + shot.point_count * (looks + hemicube(shot.resolution));
   }
   [[nodiscard]] double operator()(const PointShot& shot) const { return hemicube(shot.resolution); }
+  [[nodiscard]] double operator()(const LampShot& shot) const {
+    return kLampPixels * shot.receivers.count * std::max(receivers, 1.0);
+  }
   [[nodiscard]] double operator()(const ParallelShot& shot) const {
     return shot.view_count * (double{1.0} * shot.resolution * shot.resolution + kTrianglePixels * triangles);
   }

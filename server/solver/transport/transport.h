@@ -18,6 +18,7 @@
 
 #include "common/result.h"
 #include "server/scene/values/patch_scene.h"
+#include "server/solver/transport/lamp_shape.h"
 
 namespace radiosity::solver {
 
@@ -128,6 +129,19 @@ struct PointShot {
   ReceiverPoints receivers;
 };
 
+/// All of a lamp with a size or a web: each receiving point looks at a point of it, by a ray. (An image from the lamp
+/// would be from one of its points alone.)
+struct LampShot {
+  LampShape shape;
+  std::uint32_t first_web = 0, web_size = 0;  ///< into ShotBatch::webs
+  std::array<double, 3> intensity{};          ///< signed; as in PointShot
+  std::array<double, 3> emitted{};
+  std::array<glm::vec2, kMaxReceiverPoints> at{};  ///< on the lamp, in [0, 1)^2; turned by each leaf
+  std::uint64_t key = 0;  ///< of the turns: the same in all shots of a half, so that their points stay spread evenly
+  std::uint32_t half = 0;
+  ReceiverPoints receivers;
+};
+
 /// Light from infinity, seen in a parallel projection of the whole scene.
 struct ParallelView {
   glm::vec3 direction{0.0F};  ///< unit, towards the light
@@ -168,9 +182,11 @@ struct ShotBatch {
   std::vector<PointShot> point_lights;
   std::vector<ParallelShot> parallel;
   std::vector<ParallelView> views;  ///< of the parallel shots
+  std::vector<LampShot> lamps;
+  std::vector<float> webs;  ///< tables (LightWeb) of the lamps, one after the other
 
   [[nodiscard]] bool empty() const {
-    return scatter.empty() && gather.empty() && point_lights.empty() && parallel.empty();
+    return scatter.empty() && gather.empty() && point_lights.empty() && parallel.empty() && lamps.empty();
   }
 };
 

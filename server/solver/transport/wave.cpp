@@ -29,7 +29,7 @@ void Wave::begin(ShotBatch batch, const scene::PatchScene& patches) {
   cost_left_ = 0.0;
   for (const auto& shot : batch_.gather) cost_left_ += cost_(shot);
   for (const auto& shot : batch_.scatter) cost_left_ += cost_(shot);
-  others_left_ = !batch_.point_lights.empty() || !batch_.parallel.empty();
+  others_left_ = !batch_.point_lights.empty() || !batch_.parallel.empty() || !batch_.lamps.empty();
   under_way_ = true;
 }
 
@@ -55,6 +55,8 @@ ShotBatch Wave::nextSlice() {
     slice.point_lights = std::move(batch_.point_lights);
     slice.parallel = std::move(batch_.parallel);
     slice.views = std::move(batch_.views);
+    slice.lamps = std::move(batch_.lamps);
+    slice.webs = std::move(batch_.webs);
     return slice;
   }
   fill(batch_.gather, next_gather_, target, slice_cost_, [&](GatherShot shot) {

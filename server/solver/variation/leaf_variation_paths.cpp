@@ -92,9 +92,10 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64
     return {unhiddenSource(source, places[0]), unhiddenSource(source, places[1])};
   });
   if (drawn.chance <= 0.0) return;
+  const auto at = sobol4(0, mixKeys(key, 5));
   double factor = 0.0;
   for (std::size_t p = 0; p < 2; ++p) {
-    const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p]);
+    const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p], {at.x, at.y});
     if (drawn.unhidden[p] > 0.0 && rays_->isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
   }
   path.source = static_cast<std::uint16_t>(drawn.index);

@@ -55,6 +55,24 @@ TEST(SceneEdits, propertiesAreFoundByTheThingsNameOrItsNodes) {
               R"([{"op":"add","path":"/materials/1/name","value":"x"}])");
 }
 
+TEST(SceneEdits, lampsWithASizeOrAWebHavePropertiesOfTheirOwn) {
+  auto gltf = document();
+  gltf["extensions"]["EXT_lights_area"]["lights"] = Json::parse(R"([{"name": "panel", "type": "rect", "size": 1}])");
+  gltf["nodes"][2] = Json::parse(R"({"name": "tube", "extensions": {"EXT_lights_area": {"light": 0}}})");
+  gltf["nodes"][3] = Json::parse(R"({"name": "lit", "extensions": {"EXT_lights_ies": {"light": 0, "multiplier": 1}}})");
+  expectPatch(setPatch(gltf, "@panel.size", "2"),
+              R"([{"op":"replace","path":"/extensions/EXT_lights_area/lights/@panel/size","value":2}])");
+  expectPatch(setPatch(gltf, "@tube.intensity", "500"),
+              R"([{"op":"add","path":"/extensions/EXT_lights_area/lights/@panel/intensity","value":500}])");
+  expectPatch(setPatch(gltf, "@tube.aspect", "3"),
+              R"([{"op":"add","path":"/extensions/EXT_lights_area/lights/@panel/rect","value":{"aspect":3}}])");
+  expectPatch(setPatch(gltf, "@lit.multiplier", "0.5"),
+              R"([{"op":"replace","path":"/nodes/@lit/extensions/EXT_lights_ies/multiplier","value":0.5}])");
+  expectPatch(setPatch(gltf, "@bulb.radius", "0.1"),
+              R"([{"op":"add","path":"/extensions/KHR_lights_punctual/lights/@spot/extras",
+                   "value":{"radiosityRadius":0.1}}])");
+}
+
 TEST(SceneEdits, coloursKeepTheirAlphaAndOneNumberIsGrey) {
   const auto path = [](const char* value) {
     return R"([{"op":"replace","path":"/materials/@a~1b/pbrMetallicRoughness/baseColorFactor","value":)" +

@@ -67,6 +67,20 @@ TEST(InlineExternalFiles, packsBuffersAndImagesAndKeepsTheRest) {
   EXPECT_EQ(document["extras"]["f"], 0.1);
 }
 
+TEST(InlineExternalFiles, packsPhotometricFiles) {
+  const TemporaryFolder folder;
+  folder.write("lamp.ies", "foo");
+  folder.write("lamp.ldt", "bar");
+  const auto path = folder.write("room.gltf", R"({"asset":{"version":"2.0"},"extensions":{"EXT_lights_ies":
+    {"lights":[{"uri":"lamp.ies"},{"uri":"lamp.ldt"}]}}})");
+  EXPECT_EQ(hasExternalFiles(path), true);
+  const auto text = inlineExternalFiles(path);
+  ASSERT_TRUE(text) << text.error().text();
+  const auto lights = nlohmann::json::parse(*text)["extensions"]["EXT_lights_ies"]["lights"];
+  EXPECT_EQ(lights[0]["uri"], "data:application/x-ies-lm-63;base64,Zm9v");
+  EXPECT_EQ(lights[1]["uri"], "data:application/x-eulumdat;base64,YmFy");
+}
+
 TEST(InlineExternalFiles, isNotNeededForASelfContainedFile) {
   const TemporaryFolder folder;
   EXPECT_EQ(hasExternalFiles(folder.write("a.gltf", R"({"buffers":[{"uri":"data:;base64,AA=="}]})")), false);

@@ -240,6 +240,23 @@ void RayTransport::point(const solver::PointShot& shot, double scale, solver::Fl
   light(shot.intensity, shot.emitted, shot.half, scale, irradiance, into);
 }
 
+void RayTransport::lamp(const solver::LampShot& shot, const solver::ShotBatch& batch,
+                        solver::FluxAccumulators& into) const {
+  const solver::Lamp lamp{shot.shape, std::span(batch.webs).subspan(shot.first_web, shot.web_size)};
+  const auto irradiance = [&](const glm::vec3& p, const glm::vec3& normal) {
+    double sum = 0.0;
+    for (std::uint32_t k = 0; k < shot.receivers.count; ++k) {
+      const auto point = solver::lampPoint(lamp, glm::dvec3(p), glm::dvec3(normal), glm::dvec2(shot.at[k]));
+      if (!(point.brings > 0.0)) continue;
+      const auto to = glm::vec3(point.position) - p;
+      const float distance = glm::length(to);
+      if (cast(p, to / distance).distance >= 0.999F * distance) sum += point.brings;
+    }
+    return sum / shot.receivers.count;
+  };
+  light(shot.intensity, shot.emitted, shot.half, batch.flux_scale, irradiance, into);
+}
+
 void RayTransport::parallel(const solver::ParallelShot& shot, const solver::ShotBatch& batch,
                             solver::FluxAccumulators& into) const {
   const auto irradiance = [&](const glm::vec3& p, const glm::vec3& normal) {
@@ -260,8 +277,9 @@ Result<solver::TransportCounters> RayTransport::run(const solver::ShotBatch& bat
   for (const auto& shot : batch.gather) gather(shot, batch, into);
   for (const auto& shot : batch.point_lights) point(shot, batch.flux_scale, into);
   for (const auto& shot : batch.parallel) parallel(shot, batch, into);
+  for (const auto& shot : batch.lamps) lamp(shot, batch, into);
   solver::TransportCounters counters;
-  counters.point_images = batch.point_lights.size();
+  counters.point_images = batch.point_lights.size() + batch.lamps.size();
   counters.parallel_images = batch.views.size();
   counters.scatter_shots = batch.scatter.size();
   counters.gather_shots = batch.gather.size();

@@ -63,6 +63,7 @@ class RayTransport final : public solver::Transport {
   void light(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, std::uint32_t half, double scale,
              Irradiance irradiance, solver::FluxAccumulators& into) const;
   void point(const solver::PointShot& shot, double scale, solver::FluxAccumulators& into) const;
+  void lamp(const solver::LampShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
   void parallel(const solver::ParallelShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
 
   void countLost(const solver::GatherShot& shot, const solver::ShotBatch& batch, double light_area,

@@ -185,5 +185,89 @@ TYPED_TEST(SolverLights, WithTheLampGoneTheRoomIsAsDarkAsWithoutIt) {
   EXPECT_NEAR(received(*made.patches, solver), 0.0, 0.01 * before);
 }
 
+/// Of one square metre and `nits`, below the ceiling of the box.
+LightSources panel(float nits, double half = 0.1) {
+  scene::PunctualLight light{.kind = scene::LightKind::kRectangle, .position = {0.1, 0.2, 0.3}};
+  light.intensity = glm::vec3(nits);
+  light.half = {half, 0.2};
+  return {{light}, {}};
+}
+
+TEST(PunctualLights, AnAreaLightSendsItsRadianceTimesPiTimesItsArea) {
+  auto made = makeQuadScene(cubeQuads(4, {}, {}));
+  const auto flux = [&] { return PunctualLights(*made.patches, panel(50.0F), {}).flux()[0]; };
+  EXPECT_NEAR(flux(), 50.0 * kPi * 0.08, 1e-5);
+  made.patches->scale = 10.0;
+  EXPECT_NEAR(flux(), 50.0 * kPi * 0.08 / 100.0, 1e-7) << "of the unit box";
+}
+
+TEST(PunctualLights, ALampFarAwayIsADirectionalLight) {
+  const auto made = makeQuadScene(cubeQuads(4, {}, {}));
+  auto sources = panel(50.0F);
+  sources.lights[0].position = {0.0, 0.0, 1e6};
+  ShotBatch batch;
+  PunctualLights(*made.patches, sources, {}).addSlice(1, batch);
+  EXPECT_TRUE(batch.lamps.empty());
+  ASSERT_FALSE(batch.parallel.empty());
+  sources.lights[0].direction = {0.0, 0.0, 1.0};  // it shines the other way
+  EXPECT_EQ(PunctualLights(*made.patches, sources, {}).flux()[0], 0.0);
+}
+
+TYPED_TEST(SolverLights, AClosedGreyRoomReceivesAPanelOverOneMinusReflectance) {
+  auto made = makeQuadScene(cubeQuads(8, {}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  TypeParam solver(made.patches, made.materials, rays, SolverSettings{}, panel(50.0F));
+  solve(solver);
+  const double sent = 50.0 * kPi * 0.08;
+  EXPECT_NEAR(received(*made.patches, solver) / (sent / 0.5), 1.0, 0.03);
+}
+
+TEST(LinkedLamps, AnEditOfStrengthOrColourLooksAtNothingAnewAndOneOfSizeDoes) {
+  auto made = makeQuadScene(cubeQuads(6, {}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{}, panel(50.0F));
+  solve(solver);
+  const double before = received(*made.patches, solver);
+  const auto looks = solver.transportCounters().point_images;
+  auto other = panel(100.0F);
+  solver.setLights(other);
+  solve(solver);
+  EXPECT_NEAR(received(*made.patches, solver) / before, 2.0, 0.01);
+  EXPECT_EQ(solver.transportCounters().point_images, looks);
+  other.lights[0].half.x = 0.2;
+  solver.setLights(other);
+  solve(solver);
+  EXPECT_GT(solver.transportCounters().point_images, looks);
+}
+
+TEST(LampLooks, AreTheClosedFormWhereAllIsSeenAndNothingWhereNoneIs) {
+  LampLooks seen, hidden;
+  for (const float brings : {0.5F, 1.5F, 3.0F}) {
+    seen.ask(2.0F, brings);
+    seen.see(2.0F, brings);
+    hidden.ask(2.0F, brings);
+  }
+  EXPECT_FLOAT_EQ(seen.irradiance(3), 2.0F);
+  EXPECT_EQ(hidden.irradiance(3), 0.0F);
+  EXPECT_EQ(LampLooks().irradiance(3), 0.0F);
+}
+
+TEST(LampLooks, AreRightInTheMeanWhereAPartIsSeen) {
+  // Points bring 1 or 3, half of each are there; those that bring 3 are seen.
+  double sum = 0.0;
+  for (std::uint32_t bits = 0; bits < 256; ++bits) {
+    LampLooks looks;
+    for (std::uint32_t k = 0; k < 8; ++k) {
+      const bool strong = (bits >> k & 1U) != 0;
+      looks.ask(2.0F, strong ? 3.0F : 1.0F);
+      if (strong) looks.see(2.0F, 3.0F);
+    }
+    sum += static_cast<double>(looks.irradiance(8)) / 256.0;
+  }
+  EXPECT_NEAR(sum, 1.5, 0.01);
+}
+
 }  // namespace
 }  // namespace radiosity::solver
