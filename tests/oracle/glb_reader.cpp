@@ -70,9 +70,9 @@ class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file) {
     for (const auto& extension : file_.member("extensionsRequired")) {
-      static const std::vector<std::string> kKnown{"KHR_lights_punctual", "KHR_texture_transform",
-                                                   "KHR_materials_emissive_strength", "KHR_mesh_quantization",
-                                                   "KHR_materials_pbrSpecularGlossiness"};
+      static const std::vector<std::string> kKnown{"KHR_lights_punctual",   "EXT_lights_area",
+                                                   "KHR_texture_transform", "KHR_materials_emissive_strength",
+                                                   "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness"};
       if (std::find(kKnown.begin(), kKnown.end(), extension.get<std::string>()) == kKnown.end())
         throw std::runtime_error("requires the extension " + extension.dump());
     }
@@ -118,6 +118,23 @@ class Reader {
       lamp.inner_rad = light["spot"].value("innerConeAngle", 0.0);
       lamp.outer_rad = light["spot"].value("outerConeAngle", std::numbers::pi / 4);
     }
+    lamp.radius = light.value("extras", json::object()).value("radiosityRadius", 0.0);
+    scene_.lamps.push_back(lamp);
+  }
+
+  /// EXT_lights_area: grows with the largest scale of its node.
+  void readAreaLight(const json& light, const glm::dmat4& world) {
+    const glm::dvec3 x(world[0]), y(world[1]), z(world[2]);
+    const double size = light.value("size", 1.0) * std::max({glm::length(x), glm::length(y), glm::length(z)});
+    Lamp lamp;
+    lamp.kind = light.at("type") == "disk" ? Lamp::Kind::kDisc : Lamp::Kind::kRectangle;
+    lamp.position = glm::dvec3(world[3]);
+    lamp.direction = -glm::normalize(z);
+    lamp.intensity =
+        (light.contains("color") ? vector3(light["color"]) : glm::dvec3(1.0)) * light.value("intensity", 1000.0);
+    lamp.radius = 0.5 * size;
+    lamp.half_v = 0.5 * size * glm::normalize(y);
+    lamp.half_u = 0.5 * size * light.value("rect", json::object()).value("aspect", 1.0) * glm::normalize(x);
     scene_.lamps.push_back(lamp);
   }
 
@@ -135,6 +152,10 @@ class Reader {
     if (extensions.contains("KHR_lights_punctual")) {
       const auto& lights = file_.json().at("extensions").at("KHR_lights_punctual").at("lights");
       readLight(lights.at(extensions["KHR_lights_punctual"].at("light").get<std::size_t>()), world);
+    }
+    if (extensions.contains("EXT_lights_area")) {
+      const auto& lights = file_.json().at("extensions").at("EXT_lights_area").at("lights");
+      readAreaLight(lights.at(extensions["EXT_lights_area"].at("light").get<std::size_t>()), world);
     }
     for (const auto& child : node.value("children", json::array()))
       readNode(child.get<std::uint32_t>(), world, depth + 1);

@@ -231,7 +231,9 @@ class PathTracer::Scene {
   [[nodiscard]] glm::dvec3 lampLight(const Point& at, Random& random) const {
     glm::dvec3 sum(0.0);
     for (const auto& lamp : lamps_) {
-      const auto light = lightOf(lamp, at.position, at.shading);
+      const bool has_size = lamp.radius > 0.0 || lamp.kind == Lamp::Kind::kRectangle;
+      const double u = has_size ? random.uniform() : 0.0, v = has_size ? random.uniform() : 0.0;
+      const auto light = lightOf(lamp, at.position, at.shading, u, v);
       if (light.irradiance == glm::dvec3(0.0) || glm::dot(light.direction, at.normal) <= 0.0) continue;
       if (seesLamp(at, light.direction, light.distance, random)) sum += light.irradiance;
     }

@@ -40,15 +40,20 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
   for (const auto& light : scene.lights) {
     using Kind = test_scenes::Light::Kind;
     Lamp lamp;
-    lamp.kind = light.kind == Kind::kPoint  ? Lamp::Kind::kPoint
-                : light.kind == Kind::kSpot ? Lamp::Kind::kSpot
-                                            : Lamp::Kind::kSun;
+    lamp.kind = static_cast<Lamp::Kind>(light.kind);
     lamp.position = light.position;
     lamp.direction = glm::normalize(light.target - light.position);
     lamp.intensity = light.intensity;
     lamp.range = light.range_m;
     lamp.inner_rad = light.inner_cone_rad;
     lamp.outer_rad = light.outer_cone_rad;
+    lamp.radius = light.radius_m;
+    if (light.kind == Kind::kRectangle) {
+      const auto helper = std::abs(lamp.direction.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
+      const auto across = glm::normalize(glm::cross(helper, -lamp.direction));
+      lamp.half_u = 0.5 * light.width_m * across;
+      lamp.half_v = 0.5 * light.height_m * glm::cross(lamp.direction, across);
+    }
     result.lamps.push_back(lamp);
   }
   result.sky_upper = scene.sky_upper_nits;

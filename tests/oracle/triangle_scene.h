@@ -18,14 +18,16 @@ namespace radiosity::oracle {
 
 inline constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
 
-/// A light without extent, world space.
+/// A light that is no surface, world space.
 struct Lamp {
-  enum class Kind { kPoint, kSpot, kSun } kind = Kind::kPoint;
+  enum class Kind { kPoint, kSpot, kSun, kRectangle, kDisc } kind = Kind::kPoint;
   glm::dvec3 position{0.0};
   glm::dvec3 direction{0.0, 0.0, -1.0};  ///< unit, in which the light goes
-  glm::dvec3 intensity{0.0};             ///< candela; lux of a sun
+  glm::dvec3 intensity{0.0};             ///< candela; lux of a sun; nits of a rectangle or disc
   double range = 0.0;                    ///< metres; 0: none
   double inner_rad = 0.0, outer_rad = 0.7853981633974483;
+  double radius = 0.0;                  ///< metres; of a disc, of the ball that a point is, of a spot's disc
+  glm::dvec3 half_u{0.0}, half_v{0.0};  ///< metres; of a rectangle, from its middle
 };
 
 /// A texture where one triangle uses it.

@@ -138,8 +138,12 @@ json cameraJson(const Camera& camera) {
   return {{"type", "perspective"}, {"perspective", perspective}};
 }
 
+bool isArea(const Light& light) { return light.kind == Light::Kind::kRectangle || light.kind == Light::Kind::kDisc; }
+
+const char* extensionOf(const Light& light) { return isArea(light) ? "EXT_lights_area" : "KHR_lights_punctual"; }
+
 json lightJson(const Light& light) {
-  constexpr std::array<const char*, 3> kNames{"point", "spot", "directional"};
+  constexpr std::array<const char*, 5> kNames{"point", "spot", "directional", "rect", "disk"};
   const auto& color = light.intensity;
   const double intensity = std::max({color.x, color.y, color.z});
   json result{{"type", kNames[static_cast<std::size_t>(light.kind)]},
@@ -149,17 +153,20 @@ json lightJson(const Light& light) {
   if (light.kind == Light::Kind::kSpot) {
     result["spot"] = {{"innerConeAngle", light.inner_cone_rad}, {"outerConeAngle", light.outer_cone_rad}};
   }
+  if (isArea(light)) result["size"] = light.kind == Light::Kind::kDisc ? 2.0 * light.radius_m : light.height_m;
+  if (light.kind == Light::Kind::kRectangle) result["rect"] = {{"aspect", light.width_m / light.height_m}};
+  if (!isArea(light) && light.radius_m > 0.0) result["extras"] = {{"radiosityRadius", light.radius_m}};
   return result;
 }
 
 /// A light shines along its node's -Z.
-json lightNode(const Light& light, std::size_t index) {
+json lightNode(const Light& light, std::size_t number, std::size_t index) {
   const auto back = glm::normalize(light.position - light.target);
   const auto helper = std::abs(back.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
   const auto right = glm::normalize(glm::cross(helper, back));
   const glm::dquat q(glm::dmat3(right, glm::cross(back, right), back));
-  return {{"name", "light" + std::to_string(index)},
-          {"extensions", {{"KHR_lights_punctual", {{"light", index}}}}},
+  return {{"name", "light" + std::to_string(number)},
+          {"extensions", {{extensionOf(light), {{"light", index}}}}},
           {"translation", toJson(light.position)},
           {"rotation", json::array({q.x, q.y, q.z, q.w})}};
 }
@@ -168,14 +175,13 @@ void addLights(const TestScene& scene, json& gltf) {
   if (scene.sky_upper_nits != glm::dvec3(0.0) || scene.sky_lower_nits != glm::dvec3(0.0)) {
     gltf["extras"]["radiositySky"] = {{"upper", toJson(scene.sky_upper_nits)}, {"lower", toJson(scene.sky_lower_nits)}};
   }
-  if (scene.lights.empty()) return;
-  json lights = json::array();
-  for (const auto& light : scene.lights) {
-    gltf["nodes"].push_back(lightNode(light, lights.size()));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const auto& light = scene.lights[i];
+    auto& lights = gltf["extensions"][extensionOf(light)]["lights"];
+    if (lights.empty()) gltf["extensionsUsed"].push_back(extensionOf(light));
+    gltf["nodes"].push_back(lightNode(light, i, lights.size()));
     lights.push_back(lightJson(light));
   }
-  gltf["extensions"]["KHR_lights_punctual"]["lights"] = std::move(lights);
-  gltf["extensionsUsed"].push_back("KHR_lights_punctual");
 }
 
 json document(const TestScene& scene, Writer& writer) {

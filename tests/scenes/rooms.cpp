@@ -88,6 +88,31 @@ TestScene lightsRoom() {
   return scene;
 }
 
+TestScene areaRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_area";
+  for (auto& material : scene.materials) material.emission_nits = glm::dvec3(0.0);
+  Light panel;
+  panel.kind = Light::Kind::kRectangle;
+  panel.position = {0.0, 2.3, -0.4};
+  panel.target = {0.0, 0.0, -0.4};
+  panel.intensity = {900.0, 850.0, 800.0};
+  panel.width_m = 1.2;
+  panel.height_m = 0.3;
+  Light disc = panel;
+  disc.kind = Light::Kind::kDisc;
+  disc.position = {-1.7, 1.4, 1.2};
+  disc.target = {0.0, 0.6, 0.0};
+  disc.intensity = {600.0, 700.0, 900.0};
+  disc.radius_m = 0.15;
+  Light globe;
+  globe.position = {1.3, 1.6, 0.8};
+  globe.intensity = {30.0, 25.0, 20.0};
+  globe.radius_m = 0.1;
+  scene.lights = {panel, disc, globe};
+  return scene;
+}
+
 TestScene seminarRoom() {
   TestScene scene;
   scene.name = "room_seminar";
@@ -171,6 +196,7 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
           {"room_small", smallRoom},
           {"room_seminar", seminarRoom},
           {"room_lights", lightsRoom},
+          {"room_area", areaRoom},
           {"room_smooth", smoothRoom},
           {"cornell_double", [] { return doubleSidedTwin(cornell()); }},
           {"room_small_double", [] { return doubleSidedTwin(smallRoom()); }},

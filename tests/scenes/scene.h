@@ -31,14 +31,16 @@ struct Object {
   std::vector<Polygon> polygons;
 };
 
-/// KHR_lights_punctual.
+/// KHR_lights_punctual, or EXT_lights_area.
 struct Light {
-  enum class Kind { kPoint, kSpot, kDirectional } kind = Kind::kPoint;
+  enum class Kind { kPoint, kSpot, kDirectional, kRectangle, kDisc } kind = Kind::kPoint;
   glm::dvec3 position{0.0};
-  glm::dvec3 target{0.0, -1.0, 0.0};  ///< spot and directional: shines this way from `position`
-  glm::dvec3 intensity{1.0};          ///< candela; lux of a directional light
+  glm::dvec3 target{0.0, -1.0, 0.0};  ///< all but points: shines this way from `position`
+  glm::dvec3 intensity{1.0};          ///< candela; lux of a directional light; nits of a rectangle or disc
   double range_m = 0.0;               ///< 0: none
   double inner_cone_rad = 0.0, outer_cone_rad = 0.7853981633974483;
+  double radius_m = 0.0;                 ///< of a disc; extras.radiosityRadius of a point or spot
+  double width_m = 0.0, height_m = 0.0;  ///< of a rectangle: across is at right angles to +Y
 };
 
 struct Camera {

@@ -45,6 +45,10 @@ struct SphereSpec {
 /// The small room with a bulb and a spot light (KHR_lights_punctual) in place of its lamp.
 [[nodiscard]] TestScene lightsRoom();
 
+/// The small room with a panel, a disc (EXT_lights_area) and a globe (a point light with a radius) in place of its
+/// lamp.
+[[nodiscard]] TestScene areaRoom();
+
 /// Closed seminar room of 3,138 polygons like their figure 2: 42 tables, 80 chairs, eight ceiling lamps.
 [[nodiscard]] TestScene seminarRoom();
 

@@ -105,6 +105,64 @@ TEST(SolvedLights, PointLightOverAPlane) {
   EXPECT_NEAR(solved.report["energy"]["emitted"].get<double>(), 4.0 * std::numbers::pi * candela, 0.01);
 }
 
+TEST(SolvedLights, ADiscOverAPlaneIsItsFormFactor) {
+  auto scene = blackFloor("disc");
+  scene.lights.push_back({.kind = Light::Kind::kDisc,
+                          .position = {0.2, 1.5, 0.1},
+                          .target = {0.2, 0.0, 0.1},
+                          .intensity = {1000.0, 500.0, 200.0},
+                          .radius_m = 0.6});
+  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  EXPECT_LT(rmsFrom(solved.lit,
+                    [](const glm::dvec3& at) {
+                      const double h2 = 1.5 * 1.5, r2 = 0.6 * 0.6;
+                      const double o2 = std::pow(at.x - 0.2, 2.0) + std::pow(at.z - 0.1, 2.0);
+                      const double root = std::sqrt(std::pow(h2 + o2 + r2, 2.0) - 4.0 * r2 * o2);
+                      return std::numbers::pi * glm::dvec3(1000, 500, 200) * 0.5 * (1.0 - (h2 + o2 - r2) / root);
+                    }),
+            kMiddleForMean);
+  expectBalance(solved.report);
+  const double nits = 0.2126 * 1000.0 + 0.7152 * 500.0 + 0.0722 * 200.0;
+  EXPECT_NEAR(solved.report["energy"]["emitted"].get<double>() / (std::pow(std::numbers::pi * 0.6, 2.0) * nits), 1.0,
+              1e-5);
+}
+
+TEST(SolvedLights, ARectangleOverAPlaneIsWhatItsPointsAddUpTo) {
+  auto scene = blackFloor("rectangle");
+  scene.lights.push_back({.kind = Light::Kind::kRectangle,
+                          .position = {0.2, 1.5, 0.1},
+                          .target = {0.2, 0.0, 0.1},
+                          .intensity = glm::dvec3(1000.0),
+                          .width_m = 1.2,  // along Z, since it shines straight down
+                          .height_m = 0.4});
+  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  EXPECT_LT(rmsFrom(solved.lit,
+                    [](const glm::dvec3& at) {
+                      double sum = 0.0;
+                      for (int i = 0; i < 30; ++i)
+                        for (int j = 0; j < 10; ++j) {
+                          const glm::dvec3 d = glm::dvec3(0.04 * (j + 0.5), 1.5, -0.5 + 0.04 * (i + 0.5)) - at;
+                          sum += 1000.0 * 0.0016 * d.y * d.y / std::pow(glm::dot(d, d), 2.0);
+                        }
+                      return glm::dvec3(sum);
+                    }),
+            kMiddleForMean);
+  expectBalance(solved.report);
+}
+
+TEST(SolvedLights, AGlobeOverAPlaneIsAPointOfItsFlux) {
+  auto scene = blackFloor("globe");
+  scene.lights.push_back({.position = {0.2, 1.5, 0.1}, .intensity = {100.0, 50.0, 20.0}, .radius_m = 0.5});
+  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  EXPECT_LT(rmsFrom(solved.lit,
+                    [](const glm::dvec3& at) {
+                      const glm::dvec3 d = glm::dvec3(0.2, 1.5, 0.1) - at;
+                      return glm::dvec3(100.0, 50.0, 20.0) * (d.y / std::pow(glm::length(d), 3.0));
+                    }),
+            kMiddleForMean);
+  expectBalance(solved.report);
+}
+
 TEST(SolvedLights, SunOnAPlane) {
   auto scene = blackFloor("sun");
   scene.lights.push_back(
@@ -163,6 +221,34 @@ TEST(SolvedLights, ARoomWithAPointLightASpotAndTheSunMatchesThePathTracer) {
                           .outer_cone_rad = 0.5});
   scene.lights.push_back(
       {.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
+  const auto solved = solve(scene, kRoomArguments);
+  const auto accuracy = compare(solved);
+  EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
+  EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
+  expectBalance(solved.report);
+}
+
+TEST(SolvedLights, ARoomWithLampsOfASizeMatchesThePathTracer) {
+  auto scene = furnishedRoom("room_areas");
+  scene.lights.push_back({.kind = Light::Kind::kRectangle,
+                          .position = {0.3, 1.55, 0.2},
+                          .target = {0.3, 0.0, 0.2},
+                          .intensity = {80.0, 70.0, 60.0},
+                          .width_m = 0.6,
+                          .height_m = 0.3});
+  scene.lights.push_back({.kind = Light::Kind::kDisc,
+                          .position = {-0.8, 0.9, 0.5},
+                          .target = {0.0, 0.3, 0.0},
+                          .intensity = {100.0, 200.0, 150.0},
+                          .radius_m = 0.1});
+  scene.lights.push_back({.position = {0.6, 0.8, -0.5}, .intensity = {10.0, 9.0, 8.0}, .radius_m = 0.15});
+  scene.lights.push_back({.kind = Light::Kind::kSpot,
+                          .position = {0.7, 1.4, 0.7},
+                          .target = {0.0, 0.5, 0.0},
+                          .intensity = {30.0, 10.0, 20.0},
+                          .inner_cone_rad = 0.2,
+                          .outer_cone_rad = 0.5,
+                          .radius_m = 0.05});
   const auto solved = solve(scene, kRoomArguments);
   const auto accuracy = compare(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
