@@ -1,6 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
-import { handlesOf, hangingNodes, isSameScene, type Gltf, type GltfLight } from '../../../client/web/src/document/gltf';
+import { hangingNodes, isSameScene, type Gltf } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
 import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
@@ -222,29 +222,6 @@ describe('scenes', () => {
     expect(isSameScene(named('a', undefined), named('a', undefined, 'lamp'))).toBe(true);
     expect(isSameScene(named('floor', 'wall'), named('far away'))).toBe(false);
     expect(isSameScene(named('a'), named('x', 'y', 'a'))).toBe(false);
-  });
-});
-
-describe('handles', () => {
-  const lamp = (type: GltfLight['type'], more: object = {}): Gltf => ({
-    asset: { version: '2.0' },
-    nodes: [{ extensions: { KHR_lights_punctual: { light: 0 } }, ...more }, { mesh: 0 }, {}],
-    extensions: { KHR_lights_punctual: { lights: [{ type }] } },
-  });
-  const all = ['translate', 'rotate', 'scale'];
-
-  it('are offered where they change something', () => {
-    expect(handlesOf(lamp('point'), 0)).toEqual(['translate']);
-    expect(handlesOf(lamp('spot'), 0)).toEqual(['translate', 'rotate']);
-    expect(handlesOf(lamp('directional'), 0)).toEqual(['rotate']);
-    expect(handlesOf(lamp('point'), 1)).toEqual(all);
-    expect(handlesOf(lamp('point'), 2)).toEqual(all);
-    expect(handlesOf(lamp('area' as never), 0)).toEqual(all);
-  });
-
-  it('are all offered of a lamp with something else to it', () => {
-    expect(handlesOf(lamp('point', { mesh: 0 }), 0)).toEqual(all);
-    expect(handlesOf(lamp('point', { children: [1] }), 0)).toEqual(all);
   });
 });
 

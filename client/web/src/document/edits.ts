@@ -1,7 +1,7 @@
 // The patches that the viewer makes. Pure functions of the document.
 
 import type { Json, Patch } from '../protocol/messages';
-import { holderOf, nodeName, type Gltf, type GltfLight, type Vec3, type Vec4 } from './gltf';
+import { holderOf, nodeName, type Gltf, type Vec3, type Vec4 } from './gltf';
 import { isObject, valueAt } from './json_patch';
 
 export function setColour(material: number, gltf: Gltf, rgb: Vec3): Patch {
@@ -31,8 +31,13 @@ export function setPlacement(node: number, placement: Placement): Patch {
   return replaceMembers(`/nodes/${node}`, placement);
 }
 
-export function setLight(light: number, change: Partial<Pick<GltfLight, 'color' | 'intensity'>>): Patch {
-  return replaceMembers(`/extensions/KHR_lights_punctual/lights/${light}`, change);
+/** `path`: of a NodeLight. Objects on the way that are missing (`extras`, `rect`) come with it. */
+export function setLight(gltf: Gltf, path: string, value: Json): Patch {
+  const document = gltf as unknown as Json;
+  if (valueAt(document, path) !== undefined) return [{ op: 'replace', path, value }];
+  const end = path.lastIndexOf('/');
+  if (valueAt(document, path.slice(0, end)) !== undefined) return [{ op: 'add', path, value }];
+  return setLight(gltf, path.slice(0, end), { [path.slice(end + 1)]: value });
 }
 
 function replaceMembers(path: string, members: object): Patch {
@@ -116,7 +121,8 @@ function freeName(gltf: Gltf, wanted: string): string {
   }
 }
 
-const GROWING = /^\/(nodes|meshes|materials|cameras|extensions\/KHR_lights_punctual\/lights)\/-$/;
+const GROWING = /^\/(nodes|meshes|materials|cameras|extensions\/(KHR_lights_punctual|EXT_lights_\w+)\/lights)\/-$/;
+const LIGHTS = /^\/extensions\/(KHR_lights_punctual|EXT_lights_\w+)\/lights\//;
 const HANGING = /^\/(scenes\/\d+\/nodes|nodes\/\d+\/children)(\/|$)/;
 
 function grows(patch: Patch): boolean {
@@ -179,7 +185,7 @@ function changedPart(gltf: Gltf, path: string): string | undefined {
     return `${named ?? gltf.materials?.[index]?.name ?? `material ${key}`}: ${readable(member)}`;
   if (list === 'nodes' && rest.length > 0)
     return `${named ?? (gltf.nodes?.[index] ? nodeName(gltf, index) : `node ${key}`)}: ${readable(member)}`;
-  if (path.startsWith('/extensions/KHR_lights_punctual/lights/')) return `light: ${readable(member)}`;
+  if (LIGHTS.test(path)) return `light: ${readable(member)}`;
   return path.startsWith('/extras/radiositySky') ? 'sky' : undefined;
 }
 
@@ -198,6 +204,7 @@ function readable(member: string): string {
     emissiveFactor: 'emission',
     emissiveStrength: 'emission',
     translation: 'position',
+    radiosityRadius: 'radius',
     '-': 'new light',
   };
   return words[member] ?? member;

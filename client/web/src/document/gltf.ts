@@ -16,6 +16,8 @@ export interface GltfNode {
   matrix?: number[];
   extensions?: {
     KHR_lights_punctual?: { light: number };
+    EXT_lights_area?: { light: number };
+    EXT_lights_ies?: { light: number; multiplier?: number; color?: Vec3 };
     KHR_node_visibility?: { visible?: boolean };
     [name: string]: unknown;
   };
@@ -54,6 +56,20 @@ export interface GltfLight {
   intensity?: number;
   range?: number;
   spot?: { innerConeAngle?: number; outerConeAngle?: number };
+  /** Metres: of the ball that a point light is, or of a spot's disc. */
+  extras?: { radiosityRadius?: number };
+}
+
+/** EXT_lights_area: shines one way, along its node's negative Z axis. */
+export interface GltfAreaLight {
+  name?: string;
+  type: 'rect' | 'disk';
+  color?: Vec3;
+  /** Nits. */
+  intensity?: number;
+  /** Metres: the diameter of a disc, the height of a rectangle. */
+  size?: number;
+  rect?: { aspect?: number };
 }
 
 export interface Gltf {
@@ -65,7 +81,12 @@ export interface Gltf {
   materials?: GltfMaterial[];
   cameras?: { name?: string; type: string }[];
   extensionsUsed?: string[];
-  extensions?: { KHR_lights_punctual?: { lights: GltfLight[] }; [name: string]: unknown };
+  extensions?: {
+    KHR_lights_punctual?: { lights: GltfLight[] };
+    EXT_lights_area?: { lights: GltfAreaLight[] };
+    EXT_lights_ies?: { lights: { name?: string }[] };
+    [name: string]: unknown;
+  };
   extras?: Json;
 }
 
@@ -87,29 +108,6 @@ export function nodeName(gltf: Gltf, index: number): string {
 
 export function materialName(gltf: Gltf, index: number): string {
   return gltf.materials?.[index]?.name || `material ${index}`;
-}
-
-/** The light of a node, if it has one. */
-export function lightOf(gltf: Gltf, node: number): { index: number; light: GltfLight } | undefined {
-  const index = gltf.nodes?.[node]?.extensions?.KHR_lights_punctual?.light;
-  const light = index === undefined ? undefined : gltf.extensions?.KHR_lights_punctual?.lights[index];
-  return index === undefined || !light ? undefined : { index, light };
-}
-
-export type Handle = 'translate' | 'rotate' | 'scale';
-
-const ALL_HANDLES: readonly Handle[] = ['translate', 'rotate', 'scale'];
-const LIGHT_HANDLES: Record<GltfLight['type'], readonly Handle[]> = {
-  point: ['translate'],
-  spot: ['translate', 'rotate'],
-  directional: ['rotate'],
-};
-
-/** The handles that change something about a node: a point light, for example, has no size and no direction. */
-export function handlesOf(gltf: Gltf, node: number): readonly Handle[] {
-  const { mesh, children } = gltf.nodes?.[node] ?? {};
-  const type = lightOf(gltf, node)?.light.type;
-  return !type || mesh !== undefined || children?.length ? ALL_HANDLES : (LIGHT_HANDLES[type] ?? ALL_HANDLES);
 }
 
 /** Where a node hangs: the pointer of the list that names the node, and the place in that list. */

@@ -2,7 +2,8 @@
 
 import type { Object3D } from 'three';
 import * as edits from '../document/edits';
-import { type Gltf, handlesOf, hangingNodes, isSameScene, lightOf, nodeName } from '../document/gltf';
+import { type Gltf, hangingNodes, isSameScene, nodeName } from '../document/gltf';
+import { handlesOf, lightOf } from '../document/lights';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
 import type { Patch, ScenePatchedNote } from '../protocol/messages';
 import { type PageName, shownName } from '../protocol/page_name';
@@ -55,8 +56,7 @@ export class EditSession {
         this.make('Colour', edits.setColour(material, this.document.gltf, rgb), `colour ${material}`),
       setEmission: (material, rgb, strength) =>
         this.make('Emission', edits.setEmission(material, rgb, strength), `emission ${material}`),
-      setLight: (light, change) =>
-        this.make('Light', edits.setLight(light, change), `light ${light} ${Object.keys(change).join()}`),
+      setLight: (path, value) => this.make('Light', edits.setLight(this.document.gltf, path, value), `light ${path}`),
       setPlacement: (node, placement) => this.make('Placement', edits.setPlacement(node, placement)),
       setVisible: (node, visible) =>
         this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),

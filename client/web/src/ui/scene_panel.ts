@@ -2,17 +2,8 @@
 
 import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
-import {
-  handlesOf,
-  hangingNodes,
-  lightOf,
-  materialName,
-  nodeName,
-  type Gltf,
-  type Handle,
-  type Vec3,
-  type Vec4,
-} from '../document/gltf';
+import { hangingNodes, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
+import { handlesOf, lightOf, type Handle, type LightType, type NodeLight } from '../document/lights';
 import type { Placement } from '../document/edits';
 import { fromHex, toHex } from '../page/colours';
 import { button, buttons, panel, checkbox, field, h, row, section } from '../page/dom';
@@ -28,7 +19,7 @@ export interface ScenePanelActions {
   select(selection: Selection | undefined): void;
   setColour(material: number, rgb: Vec3): void;
   setEmission(material: number, rgb: Vec3, strength: number): void;
-  setLight(light: number, change: { color?: Vec3; intensity?: number }): void;
+  setLight(path: string, value: Vec3 | number): void;
   setPlacement(node: number, placement: Placement): void;
   setVisible(node: number, visible: boolean): void;
   remove(node: number): void;
@@ -44,6 +35,9 @@ const MOST_LISTED = 400;
 /** So many objects need no search field. */
 const FEW = 12;
 const MOST_LETTERS = 200;
+
+/** Names for people of lights that the format has another one for. */
+const LIGHT_NAMES: Partial<Record<LightType, string>> = { rect: 'rectangle', disk: 'disc', ies: 'IES' };
 
 /** A number for a narrow field: four digits; hundredths of large numbers; 0 where rounding has left less than that. */
 export function briefly(value: number): string {
@@ -221,7 +215,7 @@ export class ScenePanel {
           button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
         ),
       ),
-      ...(light ? [this.lightEditor(light.index)] : []),
+      ...(light ? [this.lightEditor(light)] : []),
       ...(material !== undefined && gltf.materials?.[material] ? [this.materialEditor(material, materials)] : []),
     );
   }
@@ -312,18 +306,17 @@ export class ScenePanel {
     );
   }
 
-  private lightEditor(index: number): HTMLElement {
-    const light = this.gltf.extensions!.KHR_lights_punctual!.lights[index]!;
-    const unit = light.type === 'directional' ? 'lx' : 'cd';
-    const colour = this.colour(toHex(light.color ?? [1, 1, 1]), (hex) =>
-      this.actions.setLight(index, { color: fromHex(hex) }),
-    );
-    const strength = this.number(String(Number((light.intensity ?? 1).toPrecision(5))), () => {
-      const value = parseNumber(strength.value);
-      if (value >= 0) this.actions.setLight(index, { intensity: value });
-      else this.refuse(strength, 'a number, 0 or more');
+  private lightEditor(light: NodeLight): HTMLElement {
+    const colour = this.colour(toHex(light.color), (hex) => this.actions.setLight(light.colorPath, fromHex(hex)));
+    const rows = light.fields.map(({ label, path, value }) => {
+      const input = this.number(String(Number(value.toPrecision(5))), () => {
+        const wanted = parseNumber(input.value);
+        if (wanted >= 0) this.actions.setLight(path, wanted);
+        else this.refuse(input, 'a number, 0 or more');
+      });
+      return field(label, input);
     });
-    return section(`Light: ${light.type}`, field('Colour', colour), field(`Intensity, ${unit}`, strength));
+    return section(`Light: ${LIGHT_NAMES[light.type] ?? light.type}`, field('Colour', colour), ...rows);
   }
 
   /** Restores the field's last good value. */

@@ -17,7 +17,7 @@ import {
   type Vector3,
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
-import type { Handle } from '../../document/gltf';
+import type { Handle } from '../../document/lights';
 import { surfaceBox, surfacesOf, trianglesOf } from '../scene/object_box';
 
 export type GizmoMode = Handle;

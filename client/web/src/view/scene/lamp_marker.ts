@@ -1,4 +1,4 @@
-// The sign of a light without a surface: a small ball in its colour, with a ring. Spots and suns also show their
+// The sign of a light that is no surface: a small ball in its colour, with a ring. All but points also show their
 // direction.
 
 import {
@@ -13,7 +13,8 @@ import {
   Object3D,
   SphereGeometry,
 } from 'three';
-import type { GltfLight } from '../../document/gltf';
+import type { Vec3 } from '../../document/gltf';
+import type { LightType } from '../../document/lights';
 
 const BALL = new SphereGeometry(1, 16, 12);
 const RING = new BufferGeometry();
@@ -39,7 +40,7 @@ export class LampMarker extends Object3D {
   }
 
   /** `size`: radius in metres, whatever the scale of the nodes above. */
-  display(light: GltfLight, size: number): void {
+  display(light: { type: LightType; color?: Vec3 }, size: number): void {
     const [r, g, b] = light.color ?? [1, 1, 1];
     const top = Math.max(r, g, b, 1e-6);
     this.ball.material.color.setRGB(r / top, g / top, b / top, LinearSRGBColorSpace);

@@ -16,7 +16,8 @@ import {
 } from 'three';
 import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { isVisible } from '../../document/edits';
-import { lightOf, type Gltf, type GltfNode, type GltfTextureInfo, type SpecularGlossiness } from '../../document/gltf';
+import type { Gltf, GltfNode, GltfTextureInfo, SpecularGlossiness } from '../../document/gltf';
+import { lightOf } from '../../document/lights';
 import { LampMarker } from './lamp_marker';
 import { LitMaterial, readSpecularGlossiness, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from '../light/lightmap_set';
@@ -219,7 +220,7 @@ export class LitScene {
       if (marker.parent !== parent) parent.add(marker);
       // A new lamp that the geometry does not contain yet hangs in the root.
       if (parent === this.root) place(marker, gltf.nodes?.[node] ?? {});
-      marker.display(lightOf(gltf, node)!.light, size);
+      marker.display(lightOf(gltf, node)!, size);
     }
   }
 

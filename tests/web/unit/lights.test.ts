@@ -1,0 +1,77 @@
+// Lights of nodes: what the viewer shows of them, and which handles they have.
+
+import * as edits from '../../../client/web/src/document/edits';
+import type { Gltf, GltfLight } from '../../../client/web/src/document/gltf';
+import { applyPatch } from '../../../client/web/src/document/json_patch';
+import { handlesOf, lightOf } from '../../../client/web/src/document/lights';
+import type { Json } from '../../../client/web/src/protocol/messages';
+
+const json = (gltf: Gltf) => gltf as unknown as Json;
+
+describe('lights', () => {
+  const lamps = (): Gltf => ({
+    asset: { version: '2.0' },
+    nodes: [
+      { extensions: { EXT_lights_area: { light: 1 } } },
+      { extensions: { EXT_lights_ies: { light: 0, multiplier: 0.5, color: [1, 0.5, 0] } } },
+      { extensions: { KHR_lights_punctual: { light: 0 } } },
+      { extensions: { EXT_lights_area: { light: 7 } } },
+    ],
+    extensions: {
+      KHR_lights_punctual: { lights: [{ type: 'point', intensity: 40 }] },
+      EXT_lights_area: { lights: [{ type: 'disk' }, { type: 'rect', intensity: 500, size: 2, rect: { aspect: 3 } }] },
+      EXT_lights_ies: { lights: [{}] },
+    },
+  });
+  const shown = (node: number) => lightOf(lamps(), node)!.fields.map(({ label, value }) => `${label}: ${value}`);
+
+  it('tell what may be changed about them, and where that lies', () => {
+    expect(shown(0)).toEqual(['Intensity, nits: 500', 'Height, m: 2', 'Width / height: 3']);
+    expect(shown(1)).toEqual(['Multiplier: 0.5']);
+    expect(shown(2)).toEqual(['Intensity, cd: 40', 'Radius, m: 0']);
+    expect(lightOf(lamps(), 1)).toMatchObject({ type: 'ies', color: [1, 0.5, 0] });
+    expect(lightOf(lamps(), 3)).toBeUndefined(); // no such light
+    for (const node of [0, 1, 2]) {
+      const { colorPath, fields } = lightOf(lamps(), node)!;
+      expect([colorPath, ...fields.map(({ path }) => path)].every((path) => path.startsWith('/'))).toBe(true);
+    }
+  });
+
+  it('get a member that they lack with the objects on the way to it', () => {
+    const gltf = lamps();
+    const [strength, radius] = lightOf(gltf, 2)!.fields;
+    expect(edits.setLight(gltf, strength!.path, 50)[0]).toMatchObject({ op: 'replace', value: 50 });
+    applyPatch(json(gltf), edits.setLight(gltf, radius!.path, 0.1));
+    expect(lightOf(gltf, 2)!.fields[1]!.value).toBe(0.1);
+    expect(edits.setLight(gltf, radius!.path, 0.2)[0]).toMatchObject({ op: 'replace', value: 0.2 });
+    expect(edits.describePatch(gltf, edits.setLight(gltf, radius!.path, 0.2))).toContain('light: radius');
+  });
+
+  it('have handles for what changes something', () => {
+    expect(handlesOf(lamps(), 0)).toEqual(['translate', 'rotate', 'scale']);
+    expect(handlesOf(lamps(), 1)).toEqual(['translate', 'rotate']);
+  });
+});
+
+describe('handles', () => {
+  const lamp = (type: GltfLight['type'], more: object = {}): Gltf => ({
+    asset: { version: '2.0' },
+    nodes: [{ extensions: { KHR_lights_punctual: { light: 0 } }, ...more }, { mesh: 0 }, {}],
+    extensions: { KHR_lights_punctual: { lights: [{ type }] } },
+  });
+  const all = ['translate', 'rotate', 'scale'];
+
+  it('are offered where they change something', () => {
+    expect(handlesOf(lamp('point'), 0)).toEqual(['translate']);
+    expect(handlesOf(lamp('spot'), 0)).toEqual(['translate', 'rotate']);
+    expect(handlesOf(lamp('directional'), 0)).toEqual(['rotate']);
+    expect(handlesOf(lamp('point'), 1)).toEqual(all);
+    expect(handlesOf(lamp('point'), 2)).toEqual(all);
+    expect(handlesOf(lamp('area' as never), 0)).toEqual(all);
+  });
+
+  it('are all offered of a lamp with something else to it', () => {
+    expect(handlesOf(lamp('point', { mesh: 0 }), 0)).toEqual(all);
+    expect(handlesOf(lamp('point', { children: [1] }), 0)).toEqual(all);
+  });
+});
