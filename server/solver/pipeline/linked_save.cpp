@@ -133,6 +133,7 @@ bool LinkedSolver::restoreShown(ArchiveReader& from) {
   end->half = half_;
   end->shaded = shaded_;
   end->error = error_;
+  end->direct_smoothing = direct_smoothing_;
   shown_ = std::move(end);
   const auto leaves = system_.leafAreas().size();
   return from.ok() && std::ranges::all_of(shown_->corrections, [&](const auto& c) { return c.value < leaves; });

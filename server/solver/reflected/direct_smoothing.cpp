@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <utility>
 
 #include "server/solver/math/halves.h"
@@ -14,6 +15,9 @@ namespace {
 /// estimate. On sides of so few leaves across it would be most of the error, however many points look.
 constexpr double kWorthwhile = 0.8;
 constexpr std::uint32_t kNarrow = 12;
+/// So much of the square is said to be left at least. Of leaves of which few points know, the halves agree with their
+/// neighbours' mean where both know nothing: of a cube in which two rays met a leaf 9 % were stated, and 17 % true.
+constexpr double kLeastLeft = 0.25;
 
 /// Square of what the mean of the halves is off by as far as their difference tells, times area.
 double noiseOf(const Side& side, std::span<const float> area, const DirectSmoothing::Halves& halves) {
@@ -26,6 +30,16 @@ double noiseOf(const Side& side, std::span<const float> area, const DirectSmooth
 }
 
 }  // namespace
+
+/// Where that is above 0. Returns what is stated more.
+double DirectSmoothing::stateMore(const Side& side, std::span<const float> area, double square) {
+  const auto of_side = area.subspan(side.first_value, side.leaf_count);
+  const double all = std::reduce(of_side.begin(), of_side.end(), 0.0);
+  if (!(square > 0.0 && all > 0.0)) return 0.0;
+  for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value)
+    leaf_bias_[value] += area[value] > 0.0F ? static_cast<float>(square / all) : 0.0F;
+  return square;
+}
 
 void DirectSmoothing::smooth(const std::vector<Side>& sides, std::span<const float> area,
                              const std::function<bool(std::uint32_t)>& is_parted, Halves& halves) {
@@ -52,8 +66,9 @@ void DirectSmoothing::smooth(const std::vector<Side>& sides, std::span<const flo
     for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value)
       bias += static_cast<double>(area[value] * leaf_bias_[value]);
     const bool is_wide = std::min(side.width, side.height) > kNarrow;
-    if (is_wide && noiseOf(side, area, halves) + bias <= kWorthwhile * noiseOf(side, area, raw)) {
-      bias_ += bias;
+    const double before = noiseOf(side, area, raw), after = noiseOf(side, area, halves);
+    if (is_wide && after + bias <= kWorthwhile * before) {
+      bias_ += bias + stateMore(side, area, kLeastLeft * before - after - bias);
       continue;
     }
     std::fill_n(leaf_bias_.begin() + side.first_value, side.leaf_count, 0.0F);

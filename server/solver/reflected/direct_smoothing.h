@@ -24,7 +24,7 @@ class DirectSmoothing {
   void smooth(const std::vector<Side>& sides, std::span<const float> area,
               const std::function<bool(std::uint32_t)>& is_parted, Halves& halves);
 
-  /// What was taken of the light itself: squares of it, times area, all leaves and channels.
+  /// What was taken of the light itself, as far as is known: squares of it, times area, all leaves and channels.
   [[nodiscard]] double bias() const { return bias_; }
   /// The same by leaf value, not times area; empty before the first time.
   [[nodiscard]] std::span<const float> biasOfLeaves() const { return leaf_bias_; }
@@ -38,6 +38,8 @@ class DirectSmoothing {
   }
 
  private:
+  double stateMore(const Side& side, std::span<const float> area, double square);
+
   double bias_ = 0.0;
   std::vector<float> leaf_bias_;
 };

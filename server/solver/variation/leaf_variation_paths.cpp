@@ -207,7 +207,8 @@ bool LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light, C
   if (tasks.empty()) return true;
   const std::size_t shares = std::max<std::size_t>(1, tasks.size() / kTasksAShare);
   auto& found = under_way_.found;
-  if (under_way_.lights != traced_for_ || !std::ranges::equal(under_way_.tasks, tasks)) {
+  const bool is_same = under_way_.lights == traced_for_ && std::ranges::equal(under_way_.tasks, tasks);
+  if (!is_same || found.size() != shares) {  // memory may have ended in the midst of this, too
     under_way_ = {{tasks.begin(), tasks.end()}, traced_for_};
     found.resize(shares);
   }

@@ -178,13 +178,15 @@ class SolvedSoon : public EngineTest {
 
 TEST_F(SolvedSoon, ItsOwnLightAloneIsShown) {
   startWith(std::chrono::minutes(1));
+  script_->pause_ms = 200;  // till there is light of its own
   ASSERT_TRUE(addCube(2));
+  EXPECT_TRUE(recorder_->lightmaps().empty());
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();  // all that was told is told
   const auto published = recorder_->lightmaps();
-  ASSERT_EQ(published.size(), 1U);
-  EXPECT_TRUE(published.front()->final);
-  EXPECT_EQ(published.front()->revision, status().revision);
+  ASSERT_FALSE(published.empty());
+  EXPECT_TRUE(published.back()->final);
+  for (const auto& lightmaps : published) EXPECT_EQ(lightmaps->revision, status().revision);
 }
 
 TEST_F(SolvedSoon, WhatIsNotIsShownAsItWasMeanwhile) {
