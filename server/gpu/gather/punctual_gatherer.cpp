@@ -206,11 +206,11 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
   const HemicubeView view{shot.frame, 0.0F};
   const auto items = source.hemicubes(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
   sum_.assign(receivers_->all().size(), 0.0F);
-  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const auto axes = hemicubeAxes(shot.frame);
   const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
   forEachArrival(shot, [&](const Arrival& arrival) {
     const auto d = -arrival.ray.way;
-    const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
+    const glm::vec3 local(glm::dot(d, axes.tangent), glm::dot(d, axes.bitangent), glm::dot(d, axes.normal));
     const bool two_sided = (arrival.care & Receivers::kTwoSided) != 0;
     if (!isHidden(*receivers_, image.at(local), arrival.ray, two_sided)) sum_[arrival.receiver] += arrival.value;
   });

@@ -124,7 +124,12 @@ class Loader {
       if (bytes->empty()) return fail(ErrorCode::kInvalidScene, "is empty", place(document_.name, pointer.to_string()));
       light.erase("uri");
       light["bufferView"] = count("bufferViews");
-      if (!light.contains("mimeType")) light["mimeType"] = "application/x-ies-lm-63";
+      if (!light.contains("mimeType")) {
+        const bool is_ies =
+            std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()).find("TILT=") !=
+            std::string_view::npos;
+        light["mimeType"] = is_ies ? "application/x-ies-lm-63" : "application/x-eulumdat";
+      }
       const Json view{{"buffer", count("buffers")}, {"byteLength", bytes->size()}};
       const Json buffer{{"byteLength", bytes->size()}};
       document_.gltf["bufferViews"].push_back(view);

@@ -107,7 +107,7 @@ class EulumdatFile {
     for (std::size_t i = 0; i < count; ++i) {
       const auto angle = number(name, 0, most);
       if (!angle) return tl::unexpected(angle.error());
-      if (!angles.empty() && !(*angle > angles.back())) return bad(std::string(name) + "s must ascend");
+      if (!angles.empty() && !(*angle >= angles.back() + kLeastAngle)) return bad(std::string(name) + "s must ascend");
       angles.push_back(*angle);
     }
     return angles;

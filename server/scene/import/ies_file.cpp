@@ -54,7 +54,7 @@ class Numbers {
     for (std::size_t i = 0; i < count; ++i) {
       const auto angle = within(name, least, most);
       if (!angle) return tl::unexpected(angle.error());
-      if (!angles.empty() && !(*angle > angles.back())) return bad(std::string(name) + " must ascend");
+      if (!angles.empty() && !(*angle >= angles.back() + kLeastAngle)) return bad(std::string(name) + " must ascend");
       angles.push_back(*angle);
     }
     return angles;

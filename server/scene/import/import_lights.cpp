@@ -8,7 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "common/task.h"
 #include "server/scene/document/document_uri.h"
+#include "server/scene/document/scene_limit.h"
 #include "server/scene/import/photometric_file.h"
 
 namespace radiosity::scene {
@@ -17,6 +19,10 @@ namespace {
 constexpr double kMaxConeRad = std::numbers::pi / 2;
 /// Metres: a lamp as large as a country is a mistake.
 constexpr double kMostSize = 1e6;
+/// Times the candela of a web, or square metres, it is still a number in single precision.
+constexpr float kBrightest = 1e24F;
+/// Of all directions: a web that shines into less is found by few of the rays that look for its light.
+constexpr double kNarrowBeam = 1e-4;
 constexpr const char* kPunctual = "KHR_lights_punctual";
 constexpr const char* kArea = "EXT_lights_area";
 constexpr const char* kIes = "EXT_lights_ies";
@@ -134,7 +140,7 @@ class LightPlacer {
                                    const std::string& pointer) const {
     for (int c = 0; c < 3; ++c) {
       light.intensity[c] = static_cast<float>(color[static_cast<std::size_t>(c)] * strength);
-      if (!std::isfinite(light.intensity[c])) return context_.bad(pointer, "is too bright to hold");
+      if (!(light.intensity[c] <= kBrightest)) return context_.bad(pointer, "is too bright to hold");
     }
     return {};
   }
@@ -148,10 +154,18 @@ class LightPlacer {
     return {};
   }
 
-  /// Read once, however many nodes and edits use it.
+  /// Read once, however many nodes use it, and edits where it lies in a buffer.
   Result<std::shared_ptr<const ReadWeb>> webOf(std::size_t index) {
-    const auto& light = lightOf(kIes, index);
     const auto pointer = pointerTo(kIes, index);
+    auto& known = context_.webs_of_lights;
+    if (const auto found = known.find(index); found != known.end()) return tell(found->second, pointer);
+    auto read = readWeb(lightOf(kIes, index), pointer);
+    if (read) known.emplace(index, *read);
+    return read;
+  }
+
+  Result<std::shared_ptr<const ReadWeb>> readWeb(const Json& light, const std::string& pointer) {
+    interruptionPoint();
     WebKey key;
     Bytes decoded;
     std::span<const std::uint8_t> bytes;
@@ -183,9 +197,16 @@ class LightPlacer {
     if (key.buffer && known != webs.end()) return tell(known->second, pointer);
     auto file = parsePhotometricFile(bytes, place(context_.document.name, pointer));
     if (!file) return tl::unexpected(file.error());
+    context_.web_bytes += file->web.table.size() * sizeof(float);
+    const auto limit = sceneMemoryLimit(context_.limits);
+    if (const auto all = context_.claimed_bytes + context_.web_bytes; all > limit.bytes)
+      return context_.tooLarge(pointer, sceneMemoryFault(all, limit, "its photometric files"));
     ReadWeb made{SharedWeb(std::make_shared<const LightWeb>(std::move(file->web))), file->frame,
                  std::move(file->warnings)};
     if (!(made.web->lumens > 0.0)) made.warnings.emplace_back("its web is dark in all directions");
+    const double whole = 4.0 * std::numbers::pi * static_cast<double>(std::ranges::max(made.web->candela()));
+    if (made.web->lumens > 0.0 && made.web->lumens < kNarrowBeam * whole)
+      made.warnings.emplace_back("its web is so narrow a beam that what it lights may be missed");
     auto shared = std::make_shared<const ReadWeb>(std::move(made));
     if (key.buffer) webs.emplace(key, shared);
     return tell(std::move(shared), pointer);

@@ -10,8 +10,6 @@
 namespace radiosity::scene {
 namespace {
 
-/// Angles of files are given to a hundredth of a degree.
-constexpr double kSameAngle = 1e-3;
 constexpr double kMostValue = 1e12;
 constexpr std::string_view kBlank = " \t\v\f";
 
@@ -52,17 +50,19 @@ std::string lumensText(double lumens) {
 }
 
 void WebColumns::mirror(double about) {
-  for (std::size_t i = 0, count = columns.size(); i < count; ++i) {
-    const double image = 2.0 * about - columns[i].azimuth;
-    const bool known = std::ranges::any_of(
-        columns, [&](const Column& column) { return std::abs(column.azimuth - image) < kSameAngle; });
-    if (!known) columns.push_back({image, columns[i].candela});
+  const auto count = static_cast<std::ptrdiff_t>(columns.size());
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const auto& column = columns[static_cast<std::size_t>(i)];
+    const double image = 2.0 * about - column.azimuth;
+    const auto told = columns.begin() + count;
+    const auto near = std::ranges::upper_bound(columns.begin(), told, image - kLeastAngle, {}, &Column::azimuth);
+    if (near == told || near->azimuth >= image + kLeastAngle) columns.push_back({image, std::vector(column.candela)});
   }
   std::ranges::sort(columns, {}, &Column::azimuth);
 }
 
 void WebColumns::close() {
-  if (columns.size() > 1 && columns.back().azimuth < columns.front().azimuth + 360.0 - kSameAngle)
+  if (columns.size() > 1 && columns.back().azimuth < columns.front().azimuth + 360.0 - kLeastAngle)
     columns.push_back({columns.front().azimuth + 360.0, columns.front().candela});
 }
 
@@ -82,8 +82,15 @@ Result<PhotometricFile> parsePhotometricFile(std::span<const std::uint8_t> bytes
   while (text.ends_with('\x1a') || text.ends_with('\0')) text.remove_suffix(1);  // of DOS, and what fills a buffer view
   if (text.find('\0') != std::string_view::npos)
     return fail(ErrorCode::kInvalidScene, "is neither an IES nor a EULUMDAT file: it is no text", where);
-  const bool is_ies = text.starts_with("IES") || text.find("TILT=") != std::string_view::npos;
-  return is_ies ? parseIes(text, where) : parseEulumdat(text, where);
+  const bool is_ies = text.starts_with("IESNA") || text.starts_with("IES:LM") || text.find("TILT=") != text.npos;
+  auto file = is_ies ? parseIes(text, where) : parseEulumdat(text, where);
+  if (!file) return file;
+  if (!isWebTable(file->web.table)) {
+    const auto most = std::to_string(kMostWebCandela);
+    return fail(ErrorCode::kTooLarge, "its symmetries written out, it has more than " + most + " directions", where);
+  }
+  if (!std::isfinite(file->web.lumens)) return fail(ErrorCode::kInvalidScene, "its light is no number", where);
+  return file;
 }
 
 }  // namespace radiosity::scene

@@ -14,6 +14,8 @@
 
 namespace radiosity::scene {
 
+/// Degrees. Angles of files are given to a hundredth; such as are no further apart are the same, and do not ascend.
+inline constexpr double kLeastAngle = 1e-3;
 /// Longer files are refused.
 inline constexpr std::size_t kMostPhotometricBytes = std::size_t{16} << 20U;
 
@@ -44,7 +46,7 @@ struct WebColumns {
   std::vector<float> polar;
   std::vector<Column> columns;
 
-  /// Adds to each column its mirror image at an azimuth, where there is none yet.
+  /// Adds to each column its mirror image at an azimuth, where there is none yet. The columns ascend, and do after it.
   void mirror(double about);
   /// A full circle whose last column is not the first again.
   void close();

@@ -20,6 +20,9 @@ struct LightWeb {
   double lumens = 0.0;    ///< integral of the candela over the sphere
   std::uint64_t key = 0;  ///< of the table
 
+  [[nodiscard]] std::span<const float> candela() const {
+    return std::span(table).subspan(2 + static_cast<std::size_t>(table[0]) + static_cast<std::size_t>(table[1]));
+  }
   /// All finite, and as long as the list says. O(n).
   [[nodiscard]] static LightWeb of(const std::vector<float>& polar_deg, const std::vector<float>& azimuth_deg,
                                    const std::vector<float>& candela);

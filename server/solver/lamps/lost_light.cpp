@@ -109,7 +109,7 @@ LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, std::uint32_
     const Lamp lamp{lampShape(patches_, light, {}), light.web ? std::span(light.web->table) : std::span<const float>()};
     const auto ray = lampRay(lamp, {at.x, at.y, at.z, at.w});
     from.position = glm::dvec3(ray.origin);
-    if (light.kind != scene::LightKind::kSpot) return {from, glm::dvec3(ray.direction)};
+    if (light.kind != scene::LightKind::kSpot) return {from, glm::dvec3(ray.direction), ray.weight};
     return {from, inCap(light.direction, std::cos(light.outer_cone_rad), at.x, at.y)};
   }
   from.position = (light.position - patches_.centre) / patches_.scale;
@@ -155,9 +155,14 @@ LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
 
 LostLight::Fate LostLight::ofLight(const scene::PunctualLight& light) const {
   Fate fate;
+  bool sends = false;
   for (std::uint32_t i = 0; i < kRays; ++i) {
-    if (follow(ofLamp(light, i, kKey), mixKeys(kKey, i), light.range / patches_.scale, fate)) break;
+    const auto ray = ofLamp(light, i, kKey);
+    if (!(ray.weight > 0.0)) continue;
+    sends = true;
+    if (follow(ray, mixKeys(kKey, i), light.range / patches_.scale, fate)) break;
   }
+  fate.arrives = fate.arrives || !sends;  // of a beam that none of them met nothing is known
   return fate;
 }
 
@@ -185,6 +190,7 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
     const auto ray = sender < first_light ? ofLeaf(sender, i, kKey)
                      : sender < first_sky ? ofLamp(sources.lights[sender - first_light], i, kKey)
                                           : fromFar(inCap(up, 0.0, at.z, at.w), at.x, at.y);
+    if (!(ray.weight > 0.0)) continue;
     Fate fate;
     (void)follow(ray, mixKeys(kKey, i), 0.0, fate);
     if (fate.back_of == scene::kNone) continue;

@@ -52,6 +52,7 @@ class LostLight {
   struct Ray {
     LeafRays::Place from;
     glm::dvec3 direction;
+    double weight = 1.0;  ///< 0: nothing is sent there
   };
   /// What sends light, by its flux: leaves, then lights, then the two halves of the sky.
   class Senders;

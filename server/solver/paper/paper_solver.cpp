@@ -10,7 +10,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x31504150U;  // "PAP1": what a checkpoint holds
+constexpr std::uint32_t kKind = 0x32504150U;  // "PAP2": what a checkpoint holds
 
 /// "We used a LOD bias of one, with filtering by a 3 by 3 Gaussian filter" (section 5).
 constexpr float kLevelBias = 1.0F;

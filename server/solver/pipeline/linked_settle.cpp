@@ -49,7 +49,6 @@ bool LinkedSolver::settle() {
   return lightLeaves();
 }
 
-/// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
 /// Where rays bring the rest.
 void LinkedSolver::smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves,
                                 ShadedLight& factors) const {
@@ -62,6 +61,7 @@ void LinkedSolver::smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Hal
   if (!shading_.empty()) shadedFactors(raw, halves, factors);
 }
 
+/// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
 bool LinkedSolver::lightLeaves() {
   if (pass_ != Pass::kRays) {
     expander_.forget();

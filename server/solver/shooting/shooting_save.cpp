@@ -6,7 +6,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x32544853U;  // "SHT2": what there is below
+constexpr std::uint32_t kKind = 0x33544853U;  // "SHT3": what there is below
 
 }  // namespace
 

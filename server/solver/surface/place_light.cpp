@@ -165,11 +165,12 @@ double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint6
     const auto point = lampPoint(lamp, place.position, spot.shading, {draw.x, draw.y});
     const auto brings = static_cast<float>(point.brings);
     const float all = lamp.shape.hasClosedForm() ? whole : brings;
-    if (!(brings > 0.0F) || glm::dot(place.normal, point.position - place.position) <= 0.0) {
+    if (!(brings > 0.0F)) {
       looks.pass(lamp.shape.hasClosedForm() ? whole : 0.0F);
       continue;
     }
     looks.ask(all, brings);
+    if (glm::dot(place.normal, point.position - place.position) <= 0.0) continue;  // the surface itself hides it
     if (isOpen(place, point.position, glm::dvec3(0.0), mixKeys(key, k))) looks.see(all, brings);
   }
   return static_cast<double>(looks.irradiance(count));

@@ -76,8 +76,8 @@ struct LampRay {
 [[nodiscard]] double lampFlux(const LampShape& shape, double web_lumens);
 
 /// What looks at single points of a lamp tell of all of it. Where all are seen that is the closed form, and 0 where
-/// none is; between, it is right in the mean: the part of the others that are seen stands for what a look's own point
-/// does not tell of.
+/// none is; between, it is nearly right in the mean: the part of the others that are seen stands for what a look's own
+/// point does not tell of.
 class LampLooks {
  public:
   /// `whole`: what all of the lamp would bring to the place of a look; `brings`: its point, which may be hidden.

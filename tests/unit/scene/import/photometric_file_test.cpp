@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 #include <numbers>
 #include <sstream>
 
@@ -203,6 +204,31 @@ TEST(Ies, CountsAreBoundedBeforeAnythingIsMade) {
   EXPECT_THAT(refusal(head + "-3 1 1 2 0 0 0 1 1 1\n"), HasSubstr("out of range"));
   EXPECT_THAT(refusal(std::string("\0\0\0", 3) + "x"), HasSubstr("no text"));
   EXPECT_THAT(refusal(""), HasSubstr("ends early"));
+}
+
+TEST(Ies, SymmetriesWrittenOutAreBoundedToo) {
+  Ies ies;
+  ies.vertical.clear();
+  for (int i = 0; i <= 399; ++i) ies.vertical.push_back(180.0 * i / 399.0);
+  ies.horizontal.clear();
+  for (int i = 0; i <= 599; ++i) ies.horizontal.push_back(90.0 * i / 599.0);
+  EXPECT_THAT(refusal(ies.text()), HasSubstr("symmetries written out, it has more than 262144 directions"));
+}
+
+TEST(Ies, ManyAzimuthsTakeTheTimeOfAsManyCandela) {
+  Ies ies;
+  ies.vertical = {0, 90};
+  ies.horizontal.clear();
+  for (int i = 0; i <= 9000; ++i) ies.horizontal.push_back(i / 100.0);
+  const auto begin = std::clock();
+  EXPECT_EQ(parsed(ies.text()).web.table[1], 36'001.0F);
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 5.0) << "a square of them took 20 s";
+}
+
+TEST(Ies, AnglesThatAreTheSameDoNotAscend) {
+  Ies ies;
+  ies.vertical = {0, 45, 45.0005, 90};
+  EXPECT_THAT(refusal(ies.text()), HasSubstr("vertical angles must ascend"));
 }
 
 /// A EULUMDAT file whose web is 1000 cos in cd / klm.

@@ -44,6 +44,13 @@ TEST(DirectSmoothing, TakesOutGrainAndSaysWhatItCost) {
   EXPECT_TRUE(smoothing.biasOfLeaves().empty());
   smoothing.smooth(field.sides, field.area, {}, field.halves);
   EXPECT_LT(field.off(), 0.25 * before);
+  double differ = 0.0;
+  for (std::size_t v = 0; v < field.truth.size(); ++v) {
+    const auto off = 0.5F * (field.halves[0][v] - field.halves[1][v]);
+    differ += static_cast<double>(field.area[v] * (off.x * off.x + off.y * off.y + off.z * off.z));
+  }
+  EXPECT_GE(differ + smoothing.bias(), field.off()) << "what is stated";
+  EXPECT_GT(smoothing.bias(), 0.0);
   ASSERT_EQ(smoothing.biasOfLeaves().size(), field.truth.size());
   double sum = 0.0;
   for (std::size_t v = 0; v < field.truth.size(); ++v)
