@@ -15,13 +15,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Kind = solver::LampShape::Kind;
 
-/// So many rays find out what of a lamp is lost.
-constexpr std::uint32_t kLostRays = 16384;
-
-/// A point of the unit square, turned around by a receiver's own number: neighbours look at other points of the lamp.
-glm::dvec2 turned(const glm::vec2& at, std::uint64_t key) {
-  const glm::dvec2 sum = glm::dvec2(at) + glm::dvec2(solver::uniformFromKey(key), solver::uniformFromKey(~key));
-  return sum - glm::floor(sum);
+/// A point of the unit square for a receiver: neighbours look at other points of the lamp.
+glm::dvec2 pointOf(const glm::vec2& at, std::uint32_t turn) {
+  const auto digits = [](float number) { return static_cast<std::uint32_t>(static_cast<double>(number) * 0x1p32); };
+  return {solver::turnedOver(digits(at.x), solver::kTurnU * turn),
+          solver::turnedOver(digits(at.y), solver::kTurnV * turn)};
 }
 
 /// All of the surface is behind a flat lamp, or beyond its range.
@@ -78,12 +76,12 @@ void LampGatherer::lookFrom(const solver::LampShot& shot, const solver::Lamp& la
     if (surface.planar && before <= -lamp.shape.reach()) return;  // all turns away
     const bool is_point = lamp.shape.kind == Kind::kWeb;
     const float near_mean = is_point ? nearMean(*receivers_, receiver, frame, lamp.shape.centre) : -1.0F;
-    const auto key = solver::mixKeys(shot.key, receiver.node);
+    const auto turn = Receivers::turnOf(receiver.texel);
     for (std::uint32_t p = 0; p < shot.receivers.count; ++p) {
       const auto place = receivers_->place(receiver, shot.receivers.at[p]);
       const auto normal = group.side * place.frame->normal;
       const glm::dvec3 at(place.point), upright(normal);
-      auto point = solver::lampPoint(lamp, at, upright, turned(shot.at[p], key));
+      auto point = solver::lampPoint(lamp, at, upright, pointOf(shot.at[p], turn));
       if (near_mean >= 0.0F && point.brings > 0.0) {
         const auto way = glm::normalize(place.point - lamp.shape.centre);
         point.brings = static_cast<double>(near_mean * lamp.strength(way));
@@ -122,27 +120,12 @@ LostShare LampGatherer::loseByRays(const solver::LampShot& shot, const solver::L
   const solver::Sobol4 draws(key);
   const auto middle = 0.5F * (box_[0] + box_[1]);
   const float reach = glm::distance(lamp.shape.centre, middle) + glm::distance(box_[0], box_[1]) + lamp.shape.reach();
-  LostShare lost;
-  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
-    interruptionPoint();
-    std::array<geometry::Ray, geometry::kPacket> rays;
-    std::array<double, geometry::kPacket> weights;
-    std::array<geometry::Hit, geometry::kPacket> hits;
-    for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
-      const auto draw = draws(first + i);
-      const auto ray = solver::lampRay(lamp, {draw.x, draw.y, draw.z, draw.w});
-      rays[i] = {ray.origin + 2.0F * Receivers::kLift * ray.direction, ray.direction, reach};
-      weights[i] = ray.weight;
-    }
-    receivers_->nearest(rays, solver::mixKeys(key, first), hits);
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      lost.all += weights[i];
-      const double reached = hits[i].found() ? weights[i] * lamp.fade(static_cast<double>(hits[i].t)) : 0.0;
-      lost.escaped += weights[i] - reached;  // what fades on its way arrives nowhere
-      if (hits[i].found() && receivers_->absorbs(rays[i], hits[i])) lost.absorbed += reached;
-    }
-  }
-  return lost;
+  const auto rayOf = [&](std::uint32_t index) -> LostRay {
+    const auto draw = draws(index);
+    const auto ray = solver::lampRay(lamp, {draw.x, draw.y, draw.z, draw.w});
+    return {{ray.origin + 2.0F * Receivers::kLift * ray.direction, ray.direction, reach}, ray.weight};
+  };
+  return lostByRays(*receivers_, key, rayOf, [&](float length) { return lamp.fade(static_cast<double>(length)); });
 }
 
 }  // namespace radiosity::gpu

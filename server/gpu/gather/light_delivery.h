@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <span>
 
+#include "common/task.h"
 #include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/receivers.h"
+#include "server/solver/math/sampling.h"
 
 namespace radiosity::gpu {
 
@@ -21,6 +23,41 @@ struct LostShare {
     return *this;
   }
 };
+
+/// So many rays find out what of a lamp is lost.
+inline constexpr std::uint32_t kLostRays = 16384;
+
+/// What a lamp sends one way, and what share of its light that is.
+struct LostRay {
+  geometry::Ray ray;
+  double weight = 0.0;
+};
+
+/// By kLostRays rays: rayOf(index) is one of them, fade(length) the part of it that gets so far.
+template <typename RayOf, typename Fade>
+[[nodiscard]] LostShare lostByRays(const Receivers& receivers, std::uint64_t key, const RayOf& rayOf,
+                                   const Fade& fade) {
+  LostShare lost;
+  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+    interruptionPoint();
+    std::array<geometry::Ray, geometry::kPacket> rays;
+    std::array<double, geometry::kPacket> weights;
+    std::array<geometry::Hit, geometry::kPacket> hits;
+    for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
+      const LostRay drawn = rayOf(first + i);
+      rays[i] = drawn.ray;
+      weights[i] = drawn.weight;
+    }
+    receivers.nearest(rays, solver::mixKeys(key, first), hits);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      lost.all += weights[i];
+      const double reached = hits[i].found() ? weights[i] * fade(hits[i].t) : 0.0;
+      lost.escaped += weights[i] - reached;  // what fades on its way arrives nowhere
+      if (hits[i].found() && receivers.absorbs(rays[i], hits[i])) lost.absorbed += reached;
+    }
+  }
+  return lost;
+}
 
 /// What a shot stands for, by channel.
 struct ShotLight {

@@ -28,16 +28,6 @@ struct TurnedPoints {
   bool is_parallelogram;
 };
 
-/// Turns are those of Roberts' sequence (2018, "The unreasonable effectiveness of quasirandom sequences"), of 2^32:
-/// 0.7549 and 0.5698.
-constexpr std::uint32_t kAlongU = 3242174889U, kAlongV = 2447445414U;
-
-/// In [0, 1). Digits are turned, and not numbers, so that what is spread evenly stays so: numbers that wrap round had
-/// 1.4 times the error.
-inline float turned(std::uint32_t number, std::uint32_t along, std::uint32_t turn) {
-  return static_cast<float>(static_cast<std::int32_t>((number ^ (along * turn)) >> 8U)) * 0x1p-24F;
-}
-
 TurnedPoints turnedPoints(const solver::GatherShot& shot, const glm::dvec4& draw) {
   const auto& [a, b, c, d, rest1, rest2, rest3, rest4] = shot.corners;
   TurnedPoints points{a,    b, c, d,
@@ -57,7 +47,8 @@ RADIOSITY_CLONES void findPointsAlongEdges(const TurnedPoints& light, std::size_
   const auto a = light.a, along_u = light.b - light.a, along_v = light.d - light.a;
   const auto u0 = light.u, v0 = light.v;
   for (std::size_t i = 0; i < count; ++i) {
-    const float u = turned(u0, kAlongU, turn[i]), v = turned(v0, kAlongV, turn[i]);
+    const float u = solver::turnedOver(u0, solver::kTurnU * turn[i]),
+                v = solver::turnedOver(v0, solver::kTurnV * turn[i]);
     x[i] = a.x + u * along_u.x + v * along_v.x;
     y[i] = a.y + u * along_u.y + v * along_v.y;
     z[i] = a.z + u * along_u.z + v * along_v.z;
@@ -71,7 +62,8 @@ RADIOSITY_CLONES void findPoints(const TurnedPoints& light, std::size_t count, c
   const float rest = 1.0F - first;
   if (is_parallelogram) return findPointsAlongEdges(light, count, turn, x, y, z);
   for (std::size_t i = 0; i < count; ++i) {
-    const float u = turned(u0, kAlongU, turn[i]), v = turned(v0, kAlongV, turn[i]);
+    const float u = solver::turnedOver(u0, solver::kTurnU * turn[i]),
+                v = solver::turnedOver(v0, solver::kTurnV * turn[i]);
     const bool in_first = u < first;
     const float root = std::sqrt(in_first ? u / first : (u - first) / rest);
     const float p = root * (1.0F - v), q = root * v, o = 1.0F - root;

@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// So many rays find out what of a light is lost, and of one of the many directions of a sky.
-constexpr std::uint32_t kLostRays = 16384, kLostRaysOfSky = 1024;
+constexpr std::uint32_t kLostRaysOfSky = 1024;
 
 /// Cone falloff of KHR_lights_punctual. `cosine`: of the angle from the axis.
 float coneFalloff(const solver::PointShot& shot, float cosine) {
@@ -389,35 +389,22 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
 
 /// Rays spread evenly over the solid angle into which the light shines.
 LostShare PunctualGatherer::loseByRays(const solver::PointShot& shot) const {
-  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const auto axes = hemicubeAxes(shot.frame);
+  const auto o = axes.origin, t = axes.tangent, b = axes.bitangent, n = axes.normal;  // lambdas take no bindings
   const float least = shot.cone_scale > 0.0F ? std::clamp(-shot.cone_offset / shot.cone_scale, 0.0F, 1.0F) : 0.0F;
   const auto key = lookOf(shot.frame.tangent, static_cast<float>(shot.frame.lattice), shot.half);
   const solver::Sobol4 draws(key);
   const float reach = glm::distance(o, 0.5F * (box_[0] + box_[1])) + glm::distance(box_[0], box_[1]);
-  LostShare lost;
-  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
-    interruptionPoint();
-    std::array<geometry::Ray, geometry::kPacket> rays;
-    std::array<double, geometry::kPacket> weights;
-    std::array<geometry::Hit, geometry::kPacket> hits;
-    for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
-      const auto draw = draws(first + i);
-      const auto cosine = 1.0F - static_cast<float>(draw.x) * (1.0F - least);
-      const float sine = std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
-      const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.y);
-      const auto direction = cosine * n + sine * (std::cos(angle) * t + std::sin(angle) * b);
-      rays[i] = {o, direction, reach};
-      weights[i] = static_cast<double>(coneFalloff(shot, cosine));
-    }
-    receivers_->nearest(rays, solver::mixKeys(key, first), hits);
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      lost.all += weights[i];
-      const double reached = hits[i].found() ? weights[i] * static_cast<double>(rangeFade(shot, hits[i].t)) : 0.0;
-      lost.escaped += weights[i] - reached;  // what fades on its way arrives nowhere
-      if (hits[i].found() && receivers_->absorbs(rays[i], hits[i])) lost.absorbed += reached;
-    }
-  }
-  return lost;
+  const auto rayOf = [&](std::uint32_t index) -> LostRay {
+    const auto draw = draws(index);
+    const auto cosine = 1.0F - static_cast<float>(draw.x) * (1.0F - least);
+    const float sine = std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
+    const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.y);
+    const auto direction = cosine * n + sine * (std::cos(angle) * t + std::sin(angle) * b);
+    return {{o, direction, reach}, static_cast<double>(coneFalloff(shot, cosine))};
+  };
+  return lostByRays(*receivers_, key, rayOf,
+                    [&](float length) { return static_cast<double>(rangeFade(shot, length)); });
 }
 
 /// Rays spread evenly over a disk around the box, which the light crosses.

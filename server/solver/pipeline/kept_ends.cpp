@@ -12,8 +12,7 @@ constexpr std::size_t kMostEnds = 32;
 }  // namespace
 
 std::size_t KeptEnd::bytes() const {
-  std::size_t bytes = sizeof(*this) + corrections.size() * sizeof(corrections[0]) +
-                      direct_smoothing.biasOfLeaves().size() * sizeof(float);
+  std::size_t bytes = sizeof(*this) + corrections.size() * sizeof(corrections[0]) + common.size() * sizeof(float);
   for (const auto* values : {&half[0], &half[1], &shaded[0], &shaded[1]}) bytes += values->size() * sizeof(glm::vec3);
   return bytes;
 }

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "server/solver/error/error_parts.h"
-#include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/variation/leaf_variation.h"
 
 namespace radiosity::solver {
@@ -21,7 +20,7 @@ struct KeptEnd {
   std::array<std::vector<glm::vec3>, 2> half;    ///< irradiance by leaf value
   std::array<std::vector<glm::vec3>, 2> shaded;  ///< what is to be added for shading normals, where there are some
   std::vector<LeafVariation::Correction> corrections;  ///< of light that varies within leaves
-  DirectSmoothing direct_smoothing;
+  std::vector<float> common;  ///< square of what both halves are off by, by leaf value; empty: not known
   ErrorParts error;
 
   [[nodiscard]] std::size_t bytes() const;

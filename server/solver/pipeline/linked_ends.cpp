@@ -50,7 +50,6 @@ bool LinkedSolver::takeKeptEnd() {
   half_ = kept->half;
   shaded_ = kept->shaded;
   error_ = kept->error;
-  direct_smoothing_ = kept->direct_smoothing;
   shown_ = kept;
   phase_ = Phase::kDone;
   return true;
@@ -66,7 +65,7 @@ void LinkedSolver::endHere() {
   end->half = half_;
   end->shaded = shaded_;
   end->error = error_;
-  end->direct_smoothing = direct_smoothing_;
+  end->common = commonOfLeaves();
   const auto corrections = this->corrections();
   end->corrections.assign(corrections.begin(), corrections.end());
   ends_.keep(std::move(end));

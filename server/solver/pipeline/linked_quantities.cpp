@@ -98,18 +98,26 @@ std::vector<float> LinkedSolver::residualShape() const {
   return shape;
 }
 
+/// What smoothing took of the light of lamps and of that of rays, by leaf value; empty: there are no rays.
+std::vector<float> LinkedSolver::commonOfLeaves() const {
+  if (!gathers()) return {};
+  const auto of_rays = gather_->biasOfLeaves(), of_lamps = direct_smoothing_.biasOfLeaves();
+  std::vector<float> common(of_rays.begin(), of_rays.end());
+  for (std::size_t value = 0; value < of_lamps.size(); ++value) common[value] += of_lamps[value];
+  return common;
+}
+
 /// Of all channels together: each has of it as it has of the leaf's light.
 std::vector<glm::vec3> LinkedSolver::commonErrorSquared() const {
-  if (!gathers()) return {};
+  const auto common = shown_ ? shown_->common : commonOfLeaves();
+  if (common.empty()) return {};
   std::vector<glm::vec3> squares(patches_->nodeCount(), glm::vec3(0.0F));
-  const auto bias = gather_->biasOfLeaves(), of_direct = direct_smoothing_.biasOfLeaves();
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const glm::vec3 irradiance = lightOf(side.first_value + leaf), square = irradiance * irradiance;
       const float all = square.x + square.y + square.z;
       const glm::vec3 parts = all > 0.0F ? square / all : glm::vec3(1.0F / 3.0F);
-      const auto value = side.first_value + leaf;
-      squares[side.first_node + leaf] = (bias[value] + (of_direct.empty() ? 0.0F : of_direct[value])) * parts;
+      squares[side.first_node + leaf] = common[side.first_value + leaf] * parts;
     }
   }
   return squares;

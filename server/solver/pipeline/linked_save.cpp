@@ -9,7 +9,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x414b4e4cU;  // "LNKA": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x424b4e4cU;  // "LNKB": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
@@ -99,7 +99,7 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   visit(to, *this);
   to(std::vector<CrowdLight>(crowds_.begin(), crowds_.end()));
   to(shown_ != nullptr);
-  if (shown_) to(shown_->corrections);
+  if (shown_) to(shown_->corrections, shown_->common);
   system_.save(to);
   to(gather_ != nullptr);
   if (gather_) gather_->save(to);
@@ -128,15 +128,15 @@ bool LinkedSolver::restoreShown(ArchiveReader& from) {
   shown_ = nullptr;
   if (!shows) return from.ok();
   auto end = std::make_shared<KeptEnd>();
-  from(end->corrections);
+  from(end->corrections, end->common);
   end->key = lightKey();
   end->half = half_;
   end->shaded = shaded_;
   end->error = error_;
-  end->direct_smoothing = direct_smoothing_;
   shown_ = std::move(end);
   const auto leaves = system_.leafAreas().size();
-  return from.ok() && std::ranges::all_of(shown_->corrections, [&](const auto& c) { return c.value < leaves; });
+  return from.ok() && (shown_->common.empty() || shown_->common.size() == leaves) &&
+         std::ranges::all_of(shown_->corrections, [&](const auto& c) { return c.value < leaves; });
 }
 
 bool LinkedSolver::restore(ArchiveReader& from) {

@@ -246,6 +246,7 @@ class LinkedSolver final : public Solver {
   void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
   /// `factors`: for what addShadedLinks() adds; empty: none.
   void smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves, ShadedLight& factors) const;
+  [[nodiscard]] std::vector<float> commonOfLeaves() const;
   void shadedFactors(const DirectSmoothing::Halves& raw, const DirectSmoothing::Halves& smooth,
                      ShadedLight& factors) const;
   static void scaleShaded(const ShadedLight& factors, ShadedLight& light);

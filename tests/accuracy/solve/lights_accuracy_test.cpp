@@ -86,20 +86,22 @@ double rmsFrom(const LitScene& lit, Formula formula) {
   return oracle::measureError(comparisons).relative_rms;
 }
 
+constexpr glm::dvec3 kPoint{0.2, 1.5, 0.1}, kCandela{100.0, 50.0, 20.0};
+/// Of a point there, or of anything that shines alike all around it.
+glm::dvec3 underThePoint(const glm::dvec3& at) {
+  const glm::dvec3 d = kPoint - at;
+  return kCandela * (d.y / std::pow(glm::length(d), 3.0));
+}
+
 // The formulas hold at a texel's middle; its mean differs by the curvature over a texel of 1/30 of the height, and the
 // receiving points are jittered: some 0.3 % together.
 constexpr double kMiddleForMean = 0.005;
 
 TEST(SolvedLights, PointLightOverAPlane) {
   auto scene = blackFloor("point");
-  scene.lights.push_back({.position = {0.2, 1.5, 0.1}, .intensity = {100.0, 50.0, 20.0}});
+  scene.lights.push_back({.position = kPoint, .intensity = kCandela});
   const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
-  EXPECT_LT(rmsFrom(solved.lit,
-                    [](const glm::dvec3& at) {
-                      const glm::dvec3 d = glm::dvec3(0.2, 1.5, 0.1) - at;
-                      return glm::dvec3(100.0, 50.0, 20.0) * (d.y / std::pow(glm::length(d), 3.0));
-                    }),
-            kMiddleForMean);
+  EXPECT_LT(rmsFrom(solved.lit, &underThePoint), kMiddleForMean);
   expectBalance(solved.report);
   const double candela = 0.2126 * 100.0 + 0.7152 * 50.0 + 0.0722 * 20.0;
   EXPECT_NEAR(solved.report["energy"]["emitted"].get<double>(), 4.0 * std::numbers::pi * candela, 0.01);
@@ -152,14 +154,9 @@ TEST(SolvedLights, ARectangleOverAPlaneIsWhatItsPointsAddUpTo) {
 
 TEST(SolvedLights, AGlobeOverAPlaneIsAPointOfItsFlux) {
   auto scene = blackFloor("globe");
-  scene.lights.push_back({.position = {0.2, 1.5, 0.1}, .intensity = {100.0, 50.0, 20.0}, .radius_m = 0.5});
+  scene.lights.push_back({.position = kPoint, .intensity = kCandela, .radius_m = 0.5});
   const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
-  EXPECT_LT(rmsFrom(solved.lit,
-                    [](const glm::dvec3& at) {
-                      const glm::dvec3 d = glm::dvec3(0.2, 1.5, 0.1) - at;
-                      return glm::dvec3(100.0, 50.0, 20.0) * (d.y / std::pow(glm::length(d), 3.0));
-                    }),
-            kMiddleForMean);
+  EXPECT_LT(rmsFrom(solved.lit, &underThePoint), kMiddleForMean);
   expectBalance(solved.report);
 }
 

@@ -69,6 +69,8 @@ class KeptEndsOfASolve : public testing::Test {
 TEST_F(KeptEndsOfASolve, EditsThatNeedMoreSamplesAndBackGiveTheSameBits) {
   const auto before = solver_->irradiance(), half = solver_->halfIrradiance(0);
   const double error = solver_->error().total;
+  const auto common = solver_->commonErrorSquared();
+  ASSERT_FALSE(common.empty());
   const auto samples = [&] { return solver_->linkCounters().rays + solver_->linkCounters().samples; };
   std::size_t needed_more = 0;
   const std::vector<std::function<void(std::vector<test::Quad>&)>> changes{
@@ -85,7 +87,9 @@ TEST_F(KeptEndsOfASolve, EditsThatNeedMoreSamplesAndBackGiveTheSameBits) {
     edit(changes[i]);
     if (samples() > there) ++needed_more;
     EXPECT_NE(solver_->irradiance(), before) << i;
+    EXPECT_NE(solver_->commonErrorSquared(), common) << i;
     edit([](auto&) {});
+    EXPECT_EQ(solver_->commonErrorSquared(), common) << i;
     EXPECT_EQ(solver_->irradiance(), before) << i;
     EXPECT_EQ(solver_->halfIrradiance(0), half) << i;
     EXPECT_EQ(solver_->error().total, error) << i;
