@@ -99,7 +99,7 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       ->capture_default_str();
   app.add_option("--max-scene-memory", o.max_scene_bytes,
                  "Memory that a scene may claim, bytes (suffixes KiB, MiB, GiB): what its file, or an edit, names in "
-                 "vertices, instances, triangles and pictures is summed up before any of it is made; 0: half of "
+                 "vertices, instances, triangles and pictures is summed up before any of it is made; 0: a quarter of "
                  "the memory there is")
       ->transform(CLI::AsSizeValue(false))
       ->type_name("SIZE")

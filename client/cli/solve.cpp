@@ -404,7 +404,7 @@ void addSolve(CLI::App& app, Run& run) {
   auto* scene_memory =
       command
           .add_option("--max-scene-memory", options->max_scene_memory,
-                      "memory that the scene may claim, such as 2GiB (default: half of what there is); a file "
+                      "memory that the scene may claim, such as 2GiB (default: a quarter of what there is); a file "
                       "that names more is refused before any of it is made")
           ->check(CLI::AsSizeValue(false).description(""))
           ->type_name("SIZE");

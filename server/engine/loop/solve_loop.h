@@ -33,7 +33,7 @@ struct EngineOptions {
   std::uint64_t first_light_above = 1'000'000;
   std::uint64_t first_texels = 100'000;
 
-  /// What a scene may claim (scene::ImportLimits); 0: half of the memory there is. Of scenes that clients load, of
+  /// What a scene may claim (scene::ImportLimits); 0: a quarter of the memory there is. Of scenes that clients load, of
   /// edits, and of the kept scene.
   std::uint64_t max_scene_bytes = 0;
 

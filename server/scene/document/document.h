@@ -27,8 +27,8 @@ struct ImportLimits {
   std::size_t max_vertices = std::size_t{1} << 26;      ///< all accessors together
   std::size_t max_triangles = std::size_t{1} << 24;     ///< after instancing
   std::size_t max_nodes = std::size_t{1} << 20;
-  /// All that a scene claims, about, summed up before it is made; 0: half of the memory there is, and no more than is
-  /// likely of so much data.
+  /// All that a scene claims, about, summed up before it is made; 0: a quarter of the memory there is, and no more than
+  /// is likely of so much data.
   std::uint64_t max_scene_bytes = 0;
   std::size_t renderers = 1;  ///< processes beside this one that hold what is drawn
 };

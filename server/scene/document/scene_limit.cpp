@@ -37,7 +37,7 @@ std::string inUnits(std::uint64_t bytes) {
 
 SceneLimit sceneMemoryLimit(const ImportLimits& limits) {
   if (limits.max_scene_bytes != 0) return {limits.max_scene_bytes, SceneLimit::Source::kOption};
-  return {memoryLimitBytes() / 2, SceneLimit::Source::kMemory};
+  return {memoryLimitBytes() / 4, SceneLimit::Source::kMemory};
 }
 
 SceneLimit likelySceneMemory(const ImportLimits& limits, std::uint64_t bytes_of_data) {
@@ -50,7 +50,7 @@ std::string sceneMemoryFault(std::uint64_t bytes, const SceneLimit& limit, std::
   const auto most = inUnits(limit.bytes);
   if (limit.source == SceneLimit::Source::kOption) return too_much + "--max-scene-memory allows " + most;
   const auto* why =
-      limit.source == SceneLimit::Source::kMemory ? "half of the memory there is" : "for so few bytes of data";
+      limit.source == SceneLimit::Source::kMemory ? "a quarter of the memory there is" : "for so few bytes of data";
   return too_much + fmt::format("the limit is {}, {}, unless --max-scene-memory names another", most, why);
 }
 

@@ -18,7 +18,7 @@ struct SceneLimit {
   Source source = Source::kOption;  ///< of the number: who is refused has to know what would change it
 };
 
-/// ImportLimits::max_scene_bytes, or what it is where it is 0: half of the memory there is.
+/// ImportLimits::max_scene_bytes, or what it is where it is 0: a quarter of the memory there is.
 [[nodiscard]] SceneLimit sceneMemoryLimit(const ImportLimits& limits);
 
 /// Unless a limit is named a scene may claim so much of its server, and so much for each byte of data: a kilobyte can

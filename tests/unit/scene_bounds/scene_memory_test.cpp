@@ -48,8 +48,8 @@ long peakKib() {
   return usage.ru_maxrss;
 }
 
-TEST(SceneMemory, HalfOfWhatThereIsIsTheLimitUnlessAnotherIsNamed) {
-  EXPECT_EQ(sceneMemoryLimit({}).bytes, memoryLimitBytes() / 2);
+TEST(SceneMemory, AQuarterOfWhatThereIsIsTheLimitUnlessAnotherIsNamed) {
+  EXPECT_EQ(sceneMemoryLimit({}).bytes, memoryLimitBytes() / 4);
   EXPECT_EQ(sceneMemoryLimit(withMemory(5)).bytes, 5U);
 }
 
@@ -64,7 +64,7 @@ TEST(SceneMemory, TheLimitIsNamedByWhatItComesFrom) {
             "with its vertices the scene would take 1.5 GiB or more; the limit is 1.5 GiB, for so few bytes of data, "
             "unless --max-scene-memory names another");
   EXPECT_THAT(fault(sceneMemoryLimit({})),
-              testing::EndsWith(", half of the memory there is, unless --max-scene-memory names another"));
+              testing::EndsWith(", a quarter of the memory there is, unless --max-scene-memory names another"));
 }
 
 TEST(SceneMemory, InstancesWithoutDataAreRefusedBeforeTheyAreMade) {
