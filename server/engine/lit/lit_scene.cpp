@@ -326,16 +326,18 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
   if (!direct.empty()) old_direct_ = carried(std::move(direct));
 }
 
-std::vector<scene::LightmapPage> LitScene::FormerLight::pages(const std::vector<glm::vec3>& light,
+std::vector<scene::LightmapPage> LitScene::FormerLight::pages(const std::vector<glm::vec3>& texels,
                                                               const LitScene& to) const {
-  auto made = scene::assemblePages(*patches, light);
+  auto made = scene::assemblePages(*patches, texels);
   return same_layout ? std::move(made) : carryLight({*scene, *patches, made}, *to.scene_, *to.patches_);
 }
 
 void LitScene::makeOldPages() {
   if (!former_light_ || former_light_->has_pages) return;
-  old_light_ = former_light_->pages(former_light_->all, *this);  // of a scene without pages: none
-  giveBack(former_light_->all);
+  // Of a scene without pages: none.
+  old_light_ = former_light_->pages(scene::fitTexels(*former_light_->patches, former_light_->all), *this);
+  giveBack(former_light_->all.mean);
+  giveBack(former_light_->all.difference);
   former_light_->has_pages = true;
   if (former_light_->direct.empty()) former_light_.reset();
 }
@@ -449,22 +451,31 @@ std::size_t LitScene::warningCount() const {
 
 /// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
 /// is: cutting it off only takes error away.
-std::vector<glm::vec3> LitScene::ownLight() const {
-  std::vector<glm::vec3> irradiance = solver_->irradiance();
-  for (auto& value : irradiance) value = glm::max(value, 0.0F);
-  return irradiance;
+scene::LeafLight LitScene::ownLight() const {
+  scene::LeafLight light{solver_->irradiance()};
+  for (auto& value : light.mean) value = glm::max(value, 0.0F);
+  if (settings_.method == Method::kPaper) {
+    light.is_shown_as_is = true;
+    return light;
+  }
+  light.difference = solver_->halfIrradiance(0);
+  const auto second = solver_->halfIrradiance(1);
+  for (std::size_t n = 0; n < second.size(); ++n) light.difference[n] -= second[n];
+  return light;
 }
 
 void LitScene::probeSurface(double seconds) {
   if (!surface_probe_.hasBegun()) {
-    const auto irradiance = ownLight();
-    surface_probe_.begin({*patches_, solver_->rays(), normals_, materials_, sources_, irradiance}, settings_.seed,
-                         scene::assemblePages(*patches_, irradiance));
+    const auto light = ownLight();
+    surface_probe_.begin({*patches_, solver_->rays(), normals_, materials_, sources_, light.mean}, settings_.seed,
+                         scene::assemblePages(*patches_, scene::fitTexels(*patches_, light)));
   }
   surface_probe_.advance(seconds);
 }
 
-std::vector<scene::LightmapPage> LitScene::pages() const { return scene::assemblePages(*patches_, ownLight()); }
+std::vector<scene::LightmapPage> LitScene::pages() const {
+  return scene::assemblePages(*patches_, scene::fitTexels(*patches_, ownLight()));
+}
 
 /// What is shown of a fade as long as nothing new is known.
 std::vector<scene::LightmapPage> LitScene::pagesOfNow() {

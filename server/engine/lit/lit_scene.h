@@ -19,6 +19,7 @@
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
 #include "server/scene/lightmap/lightmap.h"
+#include "server/scene/lightmap/texel_fit.h"
 #include "server/scene/shading/lit_sides.h"
 #include "server/scene/values/lineage.h"
 #include "server/scene/values/patch_scene.h"
@@ -163,7 +164,7 @@ class LitScene {
   bool setSky(const SolveSettings& settings);
 
   /// The solver's present irradiance by node, lux, nowhere below 0.
-  [[nodiscard]] std::vector<glm::vec3> ownLight() const;
+  [[nodiscard]] scene::LeafLight ownLight() const;
   /// Finished pages of it (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
@@ -242,10 +243,11 @@ class LitScene {
     std::shared_ptr<const scene::Scene> scene;
     std::shared_ptr<const scene::PatchScene> patches;
     bool same_layout;
-    std::vector<glm::vec3> all, direct;  ///< lux; direct empty: not known
-    bool has_pages = false;              ///< `all` is in old_light_, and given back
+    scene::LeafLight all;
+    std::vector<glm::vec3> direct;  ///< lux; empty: not known
+    bool has_pages = false;         ///< `all` is in old_light_, and given back
 
-    [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& light, const LitScene& to) const;
+    [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& texels, const LitScene& to) const;
   };
   [[nodiscard]] bool hasNoLamp() const {
     return power_ <= 0.0 && !patches_->surfaces.empty() && light_report_.dark().empty();

@@ -4,7 +4,7 @@ namespace radiosity::engine {
 
 void SurfaceProbe::begin(const solver::SolvedScene& solved, std::uint64_t seed,
                          std::span<const scene::LightmapPage> pages) {
-  auto measuring = std::make_unique<solver::SurfaceError>(solver::PlaceLight(solved), seed);
+  auto measuring = std::make_unique<solver::SurfaceError>(solved, seed);
   std::vector<glm::vec3> found;
   for (const auto& at : measuring->lookups())
     found.push_back(scene::lookUp(solved.patches, pages, at.surface, at.side, at.texel));

@@ -88,7 +88,7 @@ std::vector<IdImage> idPages(const LitScene& lit, Quantity quantity) {
 QuantityValues readQuantity(const LitScene& lit, Quantity quantity) {
   switch (quantity) {
     case Quantity::kIrradiance:
-      return {quantity, lit.ownLight(), {}, false};
+      return {quantity, {}, {}, false, lit.ownLight()};
     case Quantity::kRadiosity:
       return {quantity, radiosity(lit), {}, false};
     case Quantity::kError:
@@ -107,6 +107,7 @@ QuantityValues readQuantity(const LitScene& lit, Quantity quantity) {
 QuantityPages assemble(const scene::PatchScene& patches, QuantityValues values) {
   QuantityPages pages{values.quantity, {}, std::move(values.ids), values.squared};
   const auto seams = values.quantity == Quantity::kIrradiance ? Seams::kStitched : Seams::kLeft;
+  if (values.quantity == Quantity::kIrradiance) values.nodes = fitTexels(patches, values.light);
   if (!holdsIds(values.quantity)) pages.values = assemblePages(patches, values.nodes, seams);
   return pages;
 }

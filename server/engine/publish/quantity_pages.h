@@ -22,9 +22,10 @@ struct QuantityPages {
 /// A quantity as the solver has it at one moment.
 struct QuantityValues {
   Quantity quantity = Quantity::kIrradiance;
-  std::vector<glm::vec3> nodes;  ///< by node; empty where the quantity is whole numbers
+  std::vector<glm::vec3> nodes;  ///< by node; empty where the quantity is irradiance, or whole numbers
   std::vector<IdImage> ids;      ///< finished pages of those
   bool squared = false;          ///< as QuantityPages::squared
+  scene::LeafLight light = {};   ///< of irradiance
 };
 
 /// Costs a pass over all leaves.

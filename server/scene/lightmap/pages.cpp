@@ -37,6 +37,13 @@ std::size_t texelsOf(const Surface& surface) {
   return (std::size_t{surface.width} + 2 * kMargin) * (surface.height + 2 * kMargin);
 }
 
+/// What is thin to the eye is no less well known.
+float visiblePart(const Surface& surface, float area) {
+  if (area <= 0.0F) return 0.0F;
+  const bool whole = surface.see_through || surface.texel_area <= 0.0F;
+  return whole ? 1.0F : std::min(1.0F, area / surface.texel_area);
+}
+
 Patchwork gather(const PatchScene& patches, const Surface& surface, std::size_t side,
                  std::span<const glm::vec3> values) {
   const PagePlace& place = surface.place[side];
@@ -50,23 +57,17 @@ Patchwork gather(const PatchScene& patches, const Surface& surface, std::size_t 
   p.value.assign(count, glm::vec3(0.0F));
   p.visible.assign(count, 0.0F);
   p.ring.assign(count, kMaxRing);
-  float most = 0.0F;
+  const auto trusted = trustedLeaves(patches, surface, side);
   for (std::uint32_t y = 0; y < surface.height; ++y)
     for (std::uint32_t x = 0; x < surface.width; ++x) {
-      const std::uint32_t node = surface.first_node[side] + y * surface.width + x;
+      const std::uint32_t leaf = y * surface.width + x, node = surface.first_node[side] + leaf;
       const float area = patches.node_area[node];
       if (area <= 0.0F) continue;
       const std::size_t i = p.at(place.x + x - p.x0, place.y + y - p.y0);
       p.value[i] = values[node];
-      // What is thin to the eye is no less well known.
-      const bool whole = surface.see_through || surface.texel_area <= 0.0F;
-      p.visible[i] = whole ? 1.0F : std::min(1.0F, area / surface.texel_area);
-      most = std::max(most, p.visible[i]);
+      p.visible[i] = visiblePart(surface, area);
+      if (trusted[leaf]) p.ring[i] = 0;
     }
-  // A chart of slivers has nothing better than what it has.
-  const float enough = std::min(kMinVisible, most);
-  for (std::size_t i = 0; i < count; ++i)
-    if (p.visible[i] > 0.0F && p.visible[i] >= enough) p.ring[i] = 0;
   return p;
 }
 
@@ -326,6 +327,21 @@ class PageMaker {
 };
 
 }  // namespace
+
+std::vector<bool> trustedLeaves(const PatchScene& patches, const Surface& surface, std::size_t side) {
+  const std::uint32_t first = surface.first_node[side], count = surface.width * surface.height;
+  float most = 0.0F;
+  for (auto node = first; node < first + count; ++node)
+    most = std::max(most, visiblePart(surface, patches.node_area[node]));
+  // A chart of slivers has nothing better than what it has.
+  const float enough = std::min(kMinVisible, most);
+  std::vector<bool> trusted(count);
+  for (std::uint32_t leaf = 0; leaf < count; ++leaf) {
+    const float visible = visiblePart(surface, patches.node_area[first + leaf]);
+    trusted[leaf] = visible > 0.0F && visible >= enough;
+  }
+  return trusted;
+}
 
 std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
                                         Seams seams) {

@@ -15,6 +15,9 @@ namespace radiosity::scene {
   return 2 * surface + static_cast<std::uint32_t>(side);
 }
 
+/// By leaf of a side: whether enough of it is seen for its own value, a quarter or as much as of any.
+[[nodiscard]] std::vector<bool> trustedLeaves(const PatchScene& patches, const Surface& surface, std::size_t side);
+
 /// Which side of which surface a page texel belongs to, gutters included, and how far it is from that side's own
 /// texels.
 struct PageOwners {

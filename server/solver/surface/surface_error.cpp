@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numeric>
+#include <utility>
 
 #include "common/check.h"
 #include "common/parallel.h"
@@ -19,25 +20,69 @@ constexpr std::size_t kPlacesASlice = 64;
 constexpr double kFloor = 0.01;
 constexpr double kPercentile = 0.95;
 
+/// Part of the places that are spread by area alone.
+constexpr double kByArea = 0.5;
+/// Of the light of a leaf, what lookups may be off by where it is even, and where a part of the leaf is hidden or
+/// something passes through it.
+constexpr float kEvenPart = 0.1F, kHiddenPart = 0.5F;
+
+/// By leaf value: about the square of what lookups there may be off by, from the light of a leaf and those around it.
+std::vector<float> riskOfLeaves(const SolvedScene& solved, const std::vector<Side>& sides) {
+  const auto& patches = solved.patches;
+  std::vector<float> risks;
+  for (const auto& side : sides) {
+    const auto& surface = patches.surfaces[side.surface];
+    const auto isLit = [&](std::uint32_t leaf) { return patches.node_area[side.first_node + leaf] > 0.0F; };
+    const auto lightOf = [&](std::uint32_t leaf) { return solved.irradiance[side.first_node + leaf]; };
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const std::uint32_t x = leaf % side.width, y = leaf / side.width;
+      const auto light = lightOf(leaf);
+      glm::vec3 least = light, most = light;
+      for (auto ny = y > 0 ? y - 1 : 0; ny <= std::min(y + 1, side.height - 1); ++ny) {
+        for (auto nx = x > 0 ? x - 1 : 0; nx <= std::min(x + 1, side.width - 1); ++nx) {
+          const auto near = ny * side.width + nx;
+          if (!isLit(near)) continue;
+          least = glm::min(least, lightOf(near));
+          most = glm::max(most, lightOf(near));
+        }
+      }
+      const auto& place = patches.leaves[surface.first_leaf + leaf];
+      const auto own = (place.full && !place.cut ? kEvenPart : kHiddenPart) * light, range = most - least;
+      risks.push_back(glm::dot(range, range) + glm::dot(own, own));
+    }
+  }
+  return risks;
+}
+
 double channelMean(const glm::dvec3& light) { return (light.x + light.y + light.z) / 3.0; }
 
 }  // namespace
 
-SurfaceError::SurfaceError(PlaceLight light, std::uint64_t seed, std::size_t places)
-    : light_(std::move(light)), seed_(mixKeys(seed, 0x53555246ULL)) {
-  std::vector<double> up_to;
-  double area = 0.0;
-  for (const auto& side : light_.sides()) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      up_to.push_back(area += light_.rays().areaOf(side.first_value + leaf));
+SurfaceError::SurfaceError(const SolvedScene& solved, std::uint64_t seed, std::size_t places)
+    : light_(solved), seed_(mixKeys(seed, 0x53555246ULL)) {
+  const auto risks = riskOfLeaves(solved, light_.sides());
+  const auto areaOf = [&](std::size_t value) { return light_.rays().areaOf(static_cast<std::uint32_t>(value)); };
+  double area = 0.0, risk = 0.0;
+  for (std::size_t value = 0; value < risks.size(); ++value) {
+    area += areaOf(value);
+    risk += areaOf(value) * static_cast<double>(risks[value]);
   }
   if (area <= 0.0) return;
-  area_ = area;
+  // By value: the chance of a place, an area.
+  const auto density = [&](std::size_t value) {
+    if (!(risk > 0.0) || !std::isfinite(risk)) return 1.0 / area;
+    return kByArea / area + (1.0 - kByArea) * static_cast<double>(risks[value]) / risk;
+  };
+  std::vector<double> up_to;
+  double all = 0.0;
+  for (std::size_t value = 0; value < risks.size(); ++value) up_to.push_back(all += areaOf(value) * density(value));
   for (std::uint32_t i = 0; i < places; ++i) {  // one of each stretch
     const auto at = sobol4(i, seed_);
     const double where = (static_cast<double>(i) + uniformFromKey(mixKeys(seed_, i))) / static_cast<double>(places);
-    const auto value = static_cast<std::uint32_t>(std::ranges::upper_bound(up_to, where * area) - up_to.begin());
-    if (value < up_to.size()) spots_.push_back(light_.spotOn(value, glm::vec2(at.x, at.y)));
+    const auto value = static_cast<std::uint32_t>(std::ranges::upper_bound(up_to, where * all) - up_to.begin());
+    if (value >= up_to.size()) continue;
+    spots_.push_back(light_.spotOn(value, glm::vec2(at.x, at.y)));
+    stands_for_.push_back(1.0 / (static_cast<double>(places) * density(value)));
   }
   true_.resize(spots_.size());
 }
@@ -73,7 +118,7 @@ std::vector<SurfaceError::Measured> SurfaceError::measured() const {
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const glm::dvec3 found(found_[i]);
     all.push_back({light_.rays().sideOf(spots_[i].place.value).surface,
-                   glm::dot(found - true_[i][0], found - true_[i][1]), area_ / static_cast<double>(spots_.size())});
+                   glm::dot(found - true_[i][0], found - true_[i][1]), stands_for_[i]});
   }
   return all;
 }
@@ -83,16 +128,17 @@ SurfaceErrorParts SurfaceError::stated() const {
   SurfaceErrorParts parts;
   parts.places = spots_.size();
   const auto count = static_cast<double>(spots_.size());
-  double wrong = 0.0, squares = 0.0, light = 0.0, mean = 0.0;
-  std::vector<double> products;
+  double wrong = 0.0, squares = 0.0, light = 0.0, mean = 0.0, area = 0.0;
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const glm::dvec3 found(found_[i]);
-    const double product = glm::dot(found - true_[i][0], found - true_[i][1]);
+    const double product = stands_for_[i] * glm::dot(found - true_[i][0], found - true_[i][1]);
     wrong += product;
     squares += product * product;
-    light += glm::dot(true_[i][0], true_[i][1]);
-    mean += channelMean(true_[i][0] + true_[i][1]) / 2.0 / count;
+    light += stands_for_[i] * glm::dot(true_[i][0], true_[i][1]);
+    mean += stands_for_[i] * channelMean(true_[i][0] + true_[i][1]) / 2.0;
+    area += stands_for_[i];
   }
+  mean /= area;
   if (!std::isfinite(wrong)) {  // lookups find what is no number
     parts.total = parts.p95 = 1.0;
     return parts;
@@ -105,16 +151,25 @@ SurfaceErrorParts SurfaceError::stated() const {
   const double deviation = std::sqrt(std::max(0.0, squares - wrong * wrong / count)) / light;
   parts.deviation =
       parts.total > 0.0 ? std::min(std::sqrt(deviation), 0.5 * deviation / parts.total) : std::sqrt(deviation);
-  std::vector<double> off;
+  parts.p95 = percentile(kFloor * mean, area);
+  return parts;
+}
+
+/// What places of kPercentile of the area are off by less than, relative to their light, or to `floor` where it is less.
+double SurfaceError::percentile(double floor, double area) const {
+  std::vector<std::pair<double, double>> off;  // and the area of that
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const auto true_light = 0.5 * (true_[i][0] + true_[i][1]);
-    off.push_back(std::abs(channelMean(glm::dvec3(found_[i]) - true_light)) /
-                  std::max(channelMean(true_light), kFloor * mean));
+    off.emplace_back(std::abs(channelMean(glm::dvec3(found_[i]) - true_light)) / std::max(channelMean(true_light), floor),
+                     stands_for_[i]);
   }
-  const auto at = off.begin() + static_cast<std::ptrdiff_t>(kPercentile * static_cast<double>(off.size() - 1));
-  std::nth_element(off.begin(), at, off.end());
-  parts.p95 = *at;
-  return parts;
+  std::ranges::sort(off);
+  double below = 0.0;
+  for (const auto& [by, of] : off) {
+    below += of;
+    if (below >= kPercentile * area) return by;
+  }
+  return off.empty() ? 0.0 : off.back().first;
 }
 
 }  // namespace radiosity::solver

@@ -32,9 +32,10 @@ class SurfaceErrorTest : public testing::Test {
     irradiance_.assign(scene_.patches->nodeCount(), glm::vec3(0.0F));
   }
 
-  [[nodiscard]] PlaceLight light() const {
-    return PlaceLight({*scene_.patches, nullptr, nullptr, scene_.materials, sources_, irradiance_});
+  [[nodiscard]] SolvedScene solved() const {
+    return {*scene_.patches, nullptr, nullptr, scene_.materials, sources_, irradiance_};
   }
+  [[nodiscard]] PlaceLight light() const { return PlaceLight(solved()); }
 
   /// Of the floor, as if nothing hid the lamp.
   [[nodiscard]] static double litAt(const glm::dvec3& at) {
@@ -45,7 +46,7 @@ class SurfaceErrorTest : public testing::Test {
 
   /// Stated for lookups that find `factor` times the light that there is, on the floor; elsewhere none arrives.
   [[nodiscard]] SurfaceErrorParts statedFor(float factor, double slice = 1e9) const {
-    SurfaceError error(light(), 1, 512);
+    SurfaceError error(solved(), 1, 512);
     std::vector<glm::vec3> found;
     for (const auto& at : error.lookups()) {
       const glm::dvec3 place(-0.5 + static_cast<double>(at.texel.x) / 16.0, -0.4,
