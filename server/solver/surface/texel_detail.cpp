@@ -21,9 +21,9 @@ constexpr double kFinest = 8.0, kCoarsest = 0.5;
 constexpr double kMostDetail = 64.0, kLeastDetail = 0.5;
 /// With fewer of them nothing would be known of what coarser ones hide.
 constexpr double kFewTexels = 64.0;
-/// Lookups average the noise of four texels, but not what smoothing took of the light itself: of its square they have
-/// so much, (2/3)^2, over all places between these.
-constexpr double kLookupNoise = 4.0 / 9.0;
+/// Mean products of the weights that lookups in the half of a leaf towards a neighbour give to both, along one axis: of
+/// the leaf's own weight with itself, of both, and of the neighbour's with itself.
+constexpr double kOwnOwn = 7.0 / 12.0, kOwnNext = 1.0 / 6.0, kNextNext = 1.0 / 12.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
 constexpr double kLeastOwn = 0.1;
 
@@ -56,6 +56,30 @@ struct Grid {
     }
   }
 
+  /// Area times the square of what lookups on a leaf have, in the mean, of the noise of texels: smoothing makes those
+  /// alike that lie side by side, and what they have in common no lookup averages.
+  [[nodiscard]] double noiseOfLookups(std::uint32_t x, std::uint32_t y) const {
+    const auto noiseAt = [&](std::uint32_t nx, std::uint32_t ny) {
+      // Beyond the chart, and where nothing is known, lookups find what is nearest.
+      const auto i = nx < width && ny < height && area[at(nx, ny)] > 0.0 ? at(nx, ny) : at(x, y);
+      return 0.5 * (light[0][i] - light[1][i]);
+    };
+    const auto along = [](const glm::dvec3& own, const glm::dvec3& next, const glm::dvec3& other_own,
+                          const glm::dvec3& other_next) {
+      return kOwnOwn * glm::dot(own, other_own) + kOwnNext * (glm::dot(own, other_next) + glm::dot(next, other_own)) +
+             kNextNext * glm::dot(next, other_next);
+    };
+    double sum = 0.0;
+    for (const auto nx : {x - 1, x + 1}) {
+      for (const auto ny : {y - 1, y + 1}) {
+        const auto own = noiseAt(x, y), beside = noiseAt(nx, y), above = noiseAt(x, ny), across = noiseAt(nx, ny);
+        sum += kOwnOwn * along(own, beside, own, beside) + 2.0 * kOwnNext * along(own, beside, above, across) +
+               kNextNext * along(above, across, above, across);
+      }
+    }
+    return 0.25 * area[at(x, y)] * sum;
+  }
+
   [[nodiscard]] Grid coarser() const {
     Grid coarse;
     coarse.width = (width + 1) / 2;
@@ -82,7 +106,7 @@ struct Grid {
 struct Need {
   double texels = 0.0;                   ///< with area
   double detail = 1.0;                   ///< Surface::detail
-  double square = 0.0, noise = 0.0;      ///< area times irradiance squared, and the noise of its mean
+  double square = 0.0, noise = 0.0;      ///< area times irradiance squared, and what lookups have of noise
   double common = 0.0;                   ///< area times the square of what both halves are off by
   std::array<Bend, 2> along, along_two;  ///< by axis; of texels, and of blocks of two by two
   double power = 0.0;                    ///< of the size of texels
@@ -130,7 +154,7 @@ class DetailChooser {
     for (const auto& place : measured) found[needs_[place.surface].isNarrow() ? 1 : 0] += place.area * place.square;
     for (const auto& need : needs_) {
       const std::size_t kind = need.isNarrow() ? 1 : 0;
-      noise[kind] += kLookupNoise * need.noise + need.common;
+      noise[kind] += need.noise + need.common;
       expected[kind] += kind == 1 ? need.square : need.error;
     }
     for (auto& need : needs_) {
@@ -182,12 +206,13 @@ class DetailChooser {
       grid.light[0].push_back(one);
       grid.light[1].push_back(other);
       need.square += area * glm::dot(one, other);
-      need.noise += 0.25 * area * glm::dot(one - other, one - other);
       if (!light.common.empty()) {
         const auto& common = light.common[node + i];
         need.common += area * static_cast<double>(common.x + common.y + common.z);
       }
     }
+    for (std::uint32_t y = 0; y < grid.height; ++y)
+      for (std::uint32_t x = 0; x < grid.width; ++x) need.noise += grid.noiseOfLookups(x, y);
     const auto coarse = grid.coarser();
     for (std::uint32_t axis = 0; axis < 2; ++axis) {
       grid.addBends(axis == 0 ? 1 : 0, axis, need.along[axis]);
