@@ -468,7 +468,7 @@ void LitScene::probeSurface(double seconds) {
   if (!surface_probe_.hasBegun()) {
     const auto light = ownLight();
     surface_probe_.begin({*patches_, solver_->rays(), normals_, materials_, sources_, light.mean}, settings_.seed,
-                         scene::assemblePages(*patches_, scene::fitTexels(*patches_, light)));
+                         scene::assemblePages(*patches_, scene::fitTexels(*patches_, light)), settings_.target_error);
   }
   surface_probe_.advance(seconds);
 }

@@ -247,7 +247,8 @@ class LitScene {
     std::vector<glm::vec3> direct;  ///< lux; empty: not known
     bool has_pages = false;         ///< `all` is in old_light_, and given back
 
-    [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& texels, const LitScene& to) const;
+    [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& texels,
+                                                         const LitScene& to) const;
   };
   [[nodiscard]] bool hasNoLamp() const {
     return power_ <= 0.0 && !patches_->surfaces.empty() && light_report_.dark().empty();

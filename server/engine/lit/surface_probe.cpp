@@ -1,14 +1,21 @@
 #include "server/engine/lit/surface_probe.h"
 
 namespace radiosity::engine {
+namespace {
+
+/// Of the error that is asked for, what a measured one may be off by.
+constexpr double kWantedPart = 0.2;
+
+}  // namespace
 
 void SurfaceProbe::begin(const solver::SolvedScene& solved, std::uint64_t seed,
-                         std::span<const scene::LightmapPage> pages) {
+                         std::span<const scene::LightmapPage> pages, double target) {
   auto measuring = std::make_unique<solver::SurfaceError>(solved, seed);
   std::vector<glm::vec3> found;
   for (const auto& at : measuring->lookups())
     found.push_back(scene::lookUp(solved.patches, pages, at.surface, at.side, at.texel));
   measuring->take(std::move(found));
+  measuring->setWantedDeviation(kWantedPart * target);
   measuring_ = std::move(measuring);  // not before it is whole: memory may run out on the way
 }
 

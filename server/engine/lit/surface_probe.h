@@ -29,7 +29,9 @@ class SurfaceProbe {
   [[nodiscard]] bool isLacking() const { return !stated_ && !given_up_; }
   [[nodiscard]] bool hasBegun() const { return measuring_ != nullptr; }
   /// `solved` is to stay as it is until forget(); lookups are made in `pages`.
-  void begin(const solver::SolvedScene& solved, std::uint64_t seed, std::span<const scene::LightmapPage> pages);
+  /// `target`: the error that is asked for, which is to be told from a larger one.
+  void begin(const solver::SolvedScene& solved, std::uint64_t seed, std::span<const scene::LightmapPage> pages,
+             double target);
   /// Once it has begun: goes on for about `seconds`.
   void advance(double seconds);
   /// Nothing: it is not measured yet.

@@ -52,7 +52,8 @@ class SideFit {
     isKnown_ = trustedLeaves(patches, surface, side);
     reach_.resize(count_);
     for (std::uint32_t i = 0; i < count_; ++i) {
-      const glm::vec2 middle(static_cast<float>(i % surface.width) + 0.5F, static_cast<float>(i / surface.width) + 0.5F);
+      const glm::vec2 middle(static_cast<float>(i % surface.width) + 0.5F,
+                             static_cast<float>(i / surface.width) + 0.5F);
       if (isKnown_[i]) reach_[i] = reachOf(patches, patches.leaves[surface.first_leaf + i], middle);
     }
   }
@@ -60,7 +61,8 @@ class SideFit {
   void run(const PatchScene& patches, std::span<glm::vec3> out) const {
     const auto share = shares();
     for (std::uint32_t i = 0; i < count_; ++i)
-      if (isKnown_[i]) out[i] = fitted(i, share.empty() ? 1.0F : share[i], patches.leaves[surface_.first_leaf + i].full);
+      if (isKnown_[i])
+        out[i] = fitted(i, share.empty() ? 1.0F : share[i], patches.leaves[surface_.first_leaf + i].full);
   }
 
  private:

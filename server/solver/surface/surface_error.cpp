@@ -19,6 +19,8 @@ constexpr std::size_t kPlacesASlice = 64;
 /// Darker places than this part of the mean count as if they had so much.
 constexpr double kFloor = 0.01;
 constexpr double kPercentile = 0.95;
+/// Of a total, what it may be off by.
+constexpr double kSurePart = 0.25;
 
 /// Part of the places that are spread by area alone.
 constexpr double kByArea = 0.5;
@@ -84,7 +86,7 @@ SurfaceError::SurfaceError(const SolvedScene& solved, std::uint64_t seed, std::s
     spots_.push_back(light_.spotOn(value, glm::vec2(at.x, at.y)));
     stands_for_.push_back(1.0 / (static_cast<double>(places) * density(value)));
   }
-  true_.resize(spots_.size());
+  sums_.resize(spots_.size());
 }
 
 std::vector<SurfaceError::Lookup> SurfaceError::lookups() const {
@@ -100,17 +102,31 @@ bool SurfaceError::advance(double seconds) {
   RAD_CHECK_EQ(found_.size(), spots_.size());
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
-  while (done_ < spots_.size()) {
+  while (rounds_ < kMostRounds) {
     const auto first = done_;
     const auto end = std::min(spots_.size(), first + kPlacesASlice);
     inTurns(2 * (end - first), [&](std::size_t part) {
       const auto i = first + part / 2;
-      true_[i][part % 2] = light_.arriving(spots_[i], mixKeys(mixKeys(seed_, i), part % 2));
+      sums_[i][part % 2] += light_.arriving(spots_[i], mixKeys(mixKeys(seed_, i), 2 * rounds_ + part % 2));
     });
     done_ = end;
-    if (spent() >= seconds) break;
+    if (done_ == spots_.size()) {
+      ++rounds_;
+      if (isSure()) return true;
+      done_ = 0;
+    }
+    if (spent() >= seconds) return false;
   }
-  return done_ == spots_.size();
+  return true;
+}
+
+bool SurfaceError::isSure() const {
+  const auto stated_now = stated();
+  return stated_now.deviation <= std::max(wanted_deviation_, kSurePart * stated_now.total);
+}
+
+glm::dvec3 SurfaceError::trueLight(std::size_t place, std::size_t estimate) const {
+  return sums_[place][estimate] / static_cast<double>(rounds_);
 }
 
 std::vector<SurfaceError::Measured> SurfaceError::measured() const {
@@ -118,7 +134,7 @@ std::vector<SurfaceError::Measured> SurfaceError::measured() const {
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const glm::dvec3 found(found_[i]);
     all.push_back({light_.rays().sideOf(spots_[i].place.value).surface,
-                   glm::dot(found - true_[i][0], found - true_[i][1]), stands_for_[i]});
+                   glm::dot(found - trueLight(i, 0), found - trueLight(i, 1)), stands_for_[i]});
   }
   return all;
 }
@@ -131,11 +147,12 @@ SurfaceErrorParts SurfaceError::stated() const {
   double wrong = 0.0, squares = 0.0, light = 0.0, mean = 0.0, area = 0.0;
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const glm::dvec3 found(found_[i]);
-    const double product = stands_for_[i] * glm::dot(found - true_[i][0], found - true_[i][1]);
+    const auto one = trueLight(i, 0), other = trueLight(i, 1);
+    const double product = stands_for_[i] * glm::dot(found - one, found - other);
     wrong += product;
     squares += product * product;
-    light += stands_for_[i] * glm::dot(true_[i][0], true_[i][1]);
-    mean += stands_for_[i] * channelMean(true_[i][0] + true_[i][1]) / 2.0;
+    light += stands_for_[i] * glm::dot(one, other);
+    mean += stands_for_[i] * channelMean(one + other) / 2.0;
     area += stands_for_[i];
   }
   mean /= area;
@@ -155,13 +172,15 @@ SurfaceErrorParts SurfaceError::stated() const {
   return parts;
 }
 
-/// What places of kPercentile of the area are off by less than, relative to their light, or to `floor` where it is less.
+/// What places of kPercentile of the area are off by less than, relative to their light, or to `floor` where it is
+/// less.
 double SurfaceError::percentile(double floor, double area) const {
   std::vector<std::pair<double, double>> off;  // and the area of that
   for (std::size_t i = 0; i < spots_.size(); ++i) {
-    const auto true_light = 0.5 * (true_[i][0] + true_[i][1]);
-    off.emplace_back(std::abs(channelMean(glm::dvec3(found_[i]) - true_light)) / std::max(channelMean(true_light), floor),
-                     stands_for_[i]);
+    const auto true_light = 0.5 * (trueLight(i, 0) + trueLight(i, 1));
+    off.emplace_back(
+        std::abs(channelMean(glm::dvec3(found_[i]) - true_light)) / std::max(channelMean(true_light), floor),
+        stands_for_[i]);
   }
   std::ranges::sort(off);
   double below = 0.0;

@@ -25,6 +25,8 @@ struct SurfaceErrorParts {
 class SurfaceError {
  public:
   static constexpr std::size_t kPlaces = 2048;
+  /// Each place is estimated so often at most, until the total is known well enough.
+  static constexpr std::uint32_t kMostRounds = 8;
 
   /// Places are spread over all that has texels: half of them by area, half where lookups are likelier to be off, since
   /// light changes from leaf to leaf, or something stands on them; each counts as what it stands for. By area alone one
@@ -38,11 +40,13 @@ class SurfaceError {
     glm::vec2 texel{0.0F};
   };
   [[nodiscard]] std::vector<Lookup> lookups() const;
+  /// A total that is likely to be off by more than this, and by more than a quarter of itself, is measured again.
+  void setWantedDeviation(double deviation) { wanted_deviation_ = deviation; }
   /// What they find, lux, in that order. Before advance().
   void take(std::vector<glm::vec3> found) { found_ = std::move(found); }
 
   /// Goes on for about `seconds`, on all cores. True: it is done. Where the cuts lie changes no bit. Cost: PlaceLight,
-  /// twice a place; a quarter of a second on two cores in a room of a thousand triangles.
+  /// twice a place and round; a quarter of a second on two cores in a room of a thousand triangles, a round.
   [[nodiscard]] bool advance(double seconds);
   /// When it is done: what was found at each place, in the order of lookups().
   struct Measured {
@@ -56,14 +60,19 @@ class SurfaceError {
 
  private:
   [[nodiscard]] double percentile(double floor, double area) const;
+  [[nodiscard]] bool isSure() const;
+  /// Irradiance, lux: one of the two estimates of a place.
+  [[nodiscard]] glm::dvec3 trueLight(std::size_t place, std::size_t estimate) const;
 
   PlaceLight light_;
   std::uint64_t seed_;
   std::vector<PlaceLight::Spot> spots_;
   std::vector<double> stands_for_;  ///< unit box squared, by place
   std::vector<glm::vec3> found_;
-  std::vector<std::array<glm::dvec3, 2>> true_;  ///< two independent estimates, by place
-  std::size_t done_ = 0;
+  std::vector<std::array<glm::dvec3, 2>> sums_;  ///< two independent estimates, by place, each of all rounds
+  std::size_t done_ = 0;                         ///< places of this round
+  std::uint32_t rounds_ = 0;                     ///< that are done
+  double wanted_deviation_ = 1.0;
 };
 
 }  // namespace radiosity::solver
