@@ -19,6 +19,12 @@ constexpr std::size_t kPlacesASlice = 64;
 /// Darker places than this part of the mean count as if they had so much.
 constexpr double kFloor = 0.01;
 constexpr double kPercentile = 0.95;
+/// What is taken for the truth: the mean of both estimates, whose noise has half the square of that of each. So twice
+/// the square of the percentile by the first, less that by the second, is that without noise; it may be off, but by so
+/// much of the first at most.
+constexpr std::array<std::array<double, 2>, 1> kBothEstimates{{{0.5, 0.5}}};
+constexpr std::array<std::array<double, 2>, 2> kEachEstimate{{{1.0, 0.0}, {0.0, 1.0}}};
+constexpr double kLeastOfP95 = 0.1;
 /// Of a total, what it may be off by.
 constexpr double kSurePart = 0.25;
 
@@ -168,19 +174,24 @@ SurfaceErrorParts SurfaceError::stated() const {
   const double deviation = std::sqrt(std::max(0.0, squares - wrong * wrong / count)) / light;
   parts.deviation =
       parts.total > 0.0 ? std::min(std::sqrt(deviation), 0.5 * deviation / parts.total) : std::sqrt(deviation);
-  parts.p95 = percentile(kFloor * mean, area);
+  const double floor = kFloor * mean, both = percentile(kBothEstimates, floor),
+               single = percentile(kEachEstimate, floor);
+  parts.p95 = std::sqrt(std::max(2.0 * both * both - single * single, kLeastOfP95 * both * both));
   return parts;
 }
 
 /// What places of kPercentile of the area are off by less than, relative to their light, or to `floor` where it is
-/// less.
-double SurfaceError::percentile(double floor, double area) const {
+/// less. `weights`: the truth is taken for each of these sums of both estimates.
+double SurfaceError::percentile(std::span<const std::array<double, 2>> weights, double floor) const {
   std::vector<std::pair<double, double>> off;  // and the area of that
+  double area = 0.0;
   for (std::size_t i = 0; i < spots_.size(); ++i) {
-    const auto true_light = 0.5 * (trueLight(i, 0) + trueLight(i, 1));
-    off.emplace_back(
-        std::abs(channelMean(glm::dvec3(found_[i]) - true_light)) / std::max(channelMean(true_light), floor),
-        stands_for_[i]);
+    const double one = channelMean(trueLight(i, 0)), other = channelMean(trueLight(i, 1));
+    const double found = channelMean(glm::dvec3(found_[i])), light = std::max(0.5 * (one + other), floor);
+    for (const auto& weight : weights) {
+      off.emplace_back(std::abs(found - weight[0] * one - weight[1] * other) / light, stands_for_[i]);
+      area += stands_for_[i];
+    }
   }
   std::ranges::sort(off);
   double below = 0.0;

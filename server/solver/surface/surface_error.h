@@ -59,7 +59,7 @@ class SurfaceError {
   [[nodiscard]] SurfaceErrorParts stated() const;
 
  private:
-  [[nodiscard]] double percentile(double floor, double area) const;
+  [[nodiscard]] double percentile(std::span<const std::array<double, 2>> weights, double floor) const;
   [[nodiscard]] bool isSure() const;
   /// Irradiance, lux: one of the two estimates of a place.
   [[nodiscard]] glm::dvec3 trueLight(std::size_t place, std::size_t estimate) const;
