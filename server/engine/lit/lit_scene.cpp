@@ -102,12 +102,12 @@ void LitScene::setLayout(scene::TexelLayout layout) {
   draft_error_ = settings_.choosesTexels() && layout_.empty() ? kPilotDraft : 0.0;
 }
 
-WantedTexels LitScene::wantedTexels() const {
-  return engine::wantedTexels(*patches_, *solver_, surface_probe_.measured(), settings_, patch_count_);
+WantedTexels LitScene::wantedTexels(double aim) const {
+  return engine::wantedTexels(*patches_, *solver_, surface_probe_.measured(), aim, settings_.texels, patch_count_);
 }
 
-std::optional<double> LitScene::enoughTexels() const {
-  return engine::enoughTexels(*patches_, *solver_, surface_probe_.measured(), settings_);
+std::optional<double> LitScene::enoughTexels(double aim) const {
+  return engine::enoughTexels(*patches_, *solver_, surface_probe_.measured(), aim);
 }
 
 void LitScene::take(scene::BuiltScene built) {

@@ -223,10 +223,10 @@ class LitScene {
   /// All such shares together; before startSolve().
   void setCloser(double share) { closer_ = share; }
   [[nodiscard]] double closer() const { return closer_; }
-  /// Once surfaceError() is there: what texels there should be for the target, about.
-  [[nodiscard]] WantedTexels wantedTexels() const;
+  /// Once surfaceError() is there: what texels there should be for such a total, about.
+  [[nodiscard]] WantedTexels wantedTexels(double aim) const;
   /// Likewise: how many there would have to be, be that more than there may be. Nothing: that cannot be told.
-  [[nodiscard]] std::optional<double> enoughTexels() const;
+  [[nodiscard]] std::optional<double> enoughTexels(double aim) const;
 
  private:
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> build(scene::EditedDocument edited,

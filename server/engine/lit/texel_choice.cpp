@@ -41,11 +41,18 @@ double solverTarget(const SolveSettings& settings, double draft_error, double cl
   return std::max(kSolversPart * closer * settings.target_error, kDraftsPart * draft_error);
 }
 
+double aimAtSurface(const solver::SurfaceErrorParts& measured, double target) {
+  const double most = kP95Times * target;
+  if (measured.p95 <= most) return target;
+  const double aim = std::min(target, measured.total * most / measured.p95);
+  return aim >= kLeastAim * target ? aim : target;
+}
+
 WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver& solver,
-                          std::span<const solver::SurfaceError::Measured> measured, const SolveSettings& settings,
-                          std::uint64_t patch_count) {
-  const double most = std::min(static_cast<double>(settings.texels), kMostGrowth * static_cast<double>(patch_count));
-  auto wanted = chooseDetail(patches, solver, measured, {kTexelsPart * settings.target_error, most});
+                          std::span<const solver::SurfaceError::Measured> measured, double aim,
+                          std::uint64_t most_texels, std::uint64_t patch_count) {
+  const double most = std::min(static_cast<double>(most_texels), kMostGrowth * static_cast<double>(patch_count));
+  auto wanted = chooseDetail(patches, solver, measured, {kTexelsPart * aim, most});
   return {{std::move(wanted.of_surface), patches.scale * patches.texel, patches.scale * patches.rough_texel},
           wanted.error,
           wanted.present,
@@ -53,9 +60,8 @@ WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver
 }
 
 std::optional<double> enoughTexels(const scene::PatchScene& patches, const solver::Solver& solver,
-                                   std::span<const solver::SurfaceError::Measured> measured,
-                                   const SolveSettings& settings) {
-  const double target = kTexelsPart * settings.target_error;
+                                   std::span<const solver::SurfaceError::Measured> measured, double aim) {
+  const double target = kTexelsPart * aim;
   const auto wanted = chooseDetail(patches, solver, measured, {target, std::numeric_limits<double>::max()});
   return wanted.error <= kMet * target ? std::optional(wanted.texels) : std::nullopt;
 }

@@ -26,21 +26,25 @@ inline constexpr double kPilotDraft = 0.06;
 /// It is never less: to be sure of an error that is nearly all texels' own takes for ever.
 inline constexpr double kClosest = 0.25;
 
+/// The total to reach at the surface: the target, or less where 95 % of places are not within kP95Times the target yet,
+/// about what would bring these within it, if that is no less than kLeastAim of the target: of what is all but dark the
+/// last places take for ever. Reached once `measured.total` is no more.
+[[nodiscard]] double aimAtSurface(const solver::SurfaceErrorParts& measured, double target);
+inline constexpr double kP95Times = 5.0, kLeastAim = 0.5;
+
 struct WantedTexels {
   scene::TexelLayout layout;
   double error = 0.0;    ///< that is likely to be left by them alone
   double present = 0.0;  ///< likewise by those that there are
   double texels = 0.0;   ///< in all
 };
-/// For the target, about; `patch_count`: that there are. Cost: some passes over the leaves.
+/// For a total of `aim`, about; `patch_count`: that there are. Cost: some passes over the leaves.
 [[nodiscard]] WantedTexels wantedTexels(const scene::PatchScene& patches, const solver::Solver& solver,
-                                        std::span<const solver::SurfaceError::Measured> measured,
-                                        const SolveSettings& settings, std::uint64_t patch_count);
+                                        std::span<const solver::SurfaceError::Measured> measured, double aim,
+                                        std::uint64_t most_texels, std::uint64_t patch_count);
 
-/// How many would be enough for the target, about, however many there may be; nothing: those that there are cannot
-/// tell.
+/// How many would be enough for it, about, however many there may be; nothing: those that there are cannot tell.
 [[nodiscard]] std::optional<double> enoughTexels(const scene::PatchScene& patches, const solver::Solver& solver,
-                                                 std::span<const solver::SurfaceError::Measured> measured,
-                                                 const SolveSettings& settings);
+                                                 std::span<const solver::SurfaceError::Measured> measured, double aim);
 
 }  // namespace radiosity::engine

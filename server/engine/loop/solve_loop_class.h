@@ -138,7 +138,7 @@ class SolveLoop final : public Engine {
   void refineSlice();
   void judgeTexels();
   void endRefinement(SolveState state, std::string why);
-  void orderRefined(WantedTexels wanted);
+  void orderRefined(WantedTexels wanted, double aim);
   void giveUpTexels(const std::string& why);
   void endWithoutMemory();
   /// The time is up: where the light of coarser texels is better, that is what there is.

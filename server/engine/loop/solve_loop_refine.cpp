@@ -63,23 +63,24 @@ void SolveLoop::refineSlice() {
 
 /// Ends the solve where that has what was asked for, or can have no more of it.
 void SolveLoop::judgeTexels() {
-  const double left = lit_->surfaceError()->total;
-  if (left <= settings_.target_error) return endRefinement(SolveState::kConverged, {});
+  const auto surface = *lit_->surfaceError();
+  const double left = surface.total, aim = aimAtSurface(surface, settings_.target_error);
+  if (left <= aim) return endRefinement(SolveState::kConverged, {});
   if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
-  auto wanted = lit_->wantedTexels();
+  auto wanted = lit_->wantedTexels(aim);
   const auto texels = static_cast<double>(lit_->patchCount());
   const bool is_worthwhile = wanted.present > 0.0 && wanted.error <= kWorthwhile * wanted.present;
-  if (lit_->isDraft() && (!is_worthwhile || wanted.present < kFineEnough * settings_.target_error)) return keepTexels();
+  if (lit_->isDraft() && (!is_worthwhile || wanted.present < kFineEnough * aim)) return keepTexels();
   const bool can_solve = refinement_->otherwise != SolveState::kLimited && !lit_->isDraft();
   const double fine = refined_times_ < kMostLayouts && is_worthwhile ? kFineEnough : 1.0;
-  if (can_solve && wanted.present < fine * settings_.target_error &&
-      lit_->solveCloser(noiseShare(left, wanted.present, settings_.target_error)))
+  if (can_solve && wanted.present < fine * aim && lit_->solveCloser(noiseShare(left, wanted.present, aim)))
     return dropRefinement();
-  if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted));
+  if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted), aim);
+  if (left <= settings_.target_error) return endRefinement(SolveState::kConverged, {});
   if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
   auto why = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
                          settings_.texels, 100.0 * left);
-  const auto enough = lit_->enoughTexels();
+  const auto enough = lit_->enoughTexels(aim);
   if (enough && *enough > static_cast<double>(settings_.texels))
     why += fmt::format("; about {:.0f} would reach {:.2g} %", inTwoDigits(*enough), 100.0 * settings_.target_error);
   endRefinement(SolveState::kLimited, std::move(why));
@@ -93,10 +94,10 @@ void SolveLoop::endRefinement(SolveState state, std::string why) {
 }
 
 /// The last layout there can be is no draft.
-void SolveLoop::orderRefined(WantedTexels wanted) {
+void SolveLoop::orderRefined(WantedTexels wanted, double aim) {
   log::info("{} texels leave {:.2g} % at the surface after {:.2f} s, {:.2g} % by themselves: {:.0f} are laid out",
             lit_->patchCount(), 100.0 * lit_->surfaceError()->total, seconds_, 100.0 * wanted.present, wanted.texels);
-  const bool is_last = wanted.error <= settings_.target_error || refined_times_ + 1 == kMostLayouts ||
+  const bool is_last = wanted.error <= aim || refined_times_ + 1 == kMostLayouts ||
                        wanted.texels > kNearlyAll * static_cast<double>(settings_.texels);
   try {
     RefineJob::Order order{lit_->sharedDocument(), settings_, limits_, std::move(wanted.layout),
