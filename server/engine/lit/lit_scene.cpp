@@ -402,10 +402,10 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
   const auto direct = solver_->directIrradiance();
   if (direct.empty()) return;
   if (showsOwnLight()) {
-    auto irradiance = solver_->irradiance();
-    for (std::size_t n = 0; n < irradiance.size(); ++n)
-      irradiance[n] = glm::max(glm::max(irradiance[n], 0.0F) + direct[n] - direct_before[n], 0.0F);
-    old_light_ = scene::assemblePages(*patches_, irradiance);
+    auto light = ownLight();
+    for (std::size_t n = 0; n < light.mean.size(); ++n)
+      light.mean[n] = glm::max(light.mean[n] + direct[n] - direct_before[n], 0.0F);
+    old_light_ = scene::assemblePages(*patches_, scene::fitTexels(*patches_, light));
     until_settled_ = true;
   } else {
     old_light_ = replacePart(pagesOfNow(), scene::assemblePages(*patches_, direct_before),

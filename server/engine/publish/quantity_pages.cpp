@@ -13,7 +13,7 @@ namespace {
 using scene::Seams;
 
 std::vector<glm::vec3> radiosity(const LitScene& lit) {
-  const auto& irradiance = lit.solver().irradiance();
+  const auto irradiance = fitTexels(lit.patches(), lit.ownLight());
   std::vector<glm::vec3> values(irradiance.size());
   std::size_t side = 0;
   for (const auto& surface : lit.patches().surfaces) {
@@ -21,7 +21,7 @@ std::vector<glm::vec3> radiosity(const LitScene& lit) {
       if (first == scene::kNone) continue;
       const auto emission = lit.materials().emission.side(side), reflectance = lit.materials().reflectance.side(side);
       for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
-        values[first + leaf] = emission[leaf] + reflectance[leaf] * glm::max(irradiance[first + leaf], 0.0F);
+        values[first + leaf] = emission[leaf] + reflectance[leaf] * irradiance[first + leaf];
       ++side;
     }
   }

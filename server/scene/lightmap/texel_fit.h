@@ -22,7 +22,7 @@ struct LeafLight {
 /// itself a lookup smooths twice, by the leaf and between texels, and says of the middle of a leaf what the visible
 /// part has, wherever it lies. One step of the iteration of Van Cittert (1931) for that equation ("least squares" of
 /// Kavan, Bargteil and Sloan 2011 needs samples within leaves): at the edge of a shadow as wide as a leaf the square of
-/// the error falls to 0.6 of what it was, of wider ones to 0.4, of a step to 0.87.
+/// the error falls to 0.72 of what it was, of wider ones to 0.5, of a step to 0.95.
 ///
 /// Noise would grow likewise: a step counts as far as both halves agree on it (Wiener 1949). What lies beyond all
 /// neighbours is taken back by half, since one sees a rim along a shadow. Never below zero. Cost: two passes over the

@@ -104,6 +104,23 @@ TEST_F(SurfaceErrorTest, WhatLookupsAreOffByIsStated) {
   EXPECT_LT(statedFor(1.0F).p95, 1e-3);
 }
 
+// More places lie where light changes from leaf to leaf, and each of them counts for less.
+TEST_F(SurfaceErrorTest, WherePlacesLieChangesNothingThatIsStated) {
+  for (std::uint32_t leaf = 0; leaf < 256; ++leaf) irradiance_[leaf] = glm::vec3(leaf % 16 == 3 ? 100.0F : 0.0F);
+  EXPECT_NEAR(statedFor(1.1F).total, 0.1, 1e-3);
+  EXPECT_NEAR(statedFor(1.1F).p95, 0.1, 1e-3);
+  SurfaceError error(solved(), 1, 512);
+  error.take(std::vector<glm::vec3>(error.lookups().size()));
+  while (!error.advance(1e9)) continue;
+  std::size_t in_stripe = 0;
+  double area = 0.0;
+  for (const auto& at : error.lookups())
+    in_stripe += at.surface == 0 && at.texel.x >= 2.0F && at.texel.x < 5.0F ? 1 : 0;
+  for (const auto& place : error.measured()) area += place.area;
+  EXPECT_GT(in_stripe, 200U);
+  EXPECT_NEAR(area, 1.04, 0.02);  // of the floor and the lamp, by chance
+}
+
 TEST_F(SurfaceErrorTest, WhereTheCutsLieChangesNoBit) {
   const auto whole = statedFor(1.1F), sliced = statedFor(1.1F, 0.0);
   EXPECT_EQ(whole.total, sliced.total);
@@ -116,6 +133,24 @@ TEST_F(SurfaceErrorUnderAPlate, AShadowThatLookupsMissIsStated) {
   const auto stated = statedFor(1.0F);
   EXPECT_GT(stated.total, 0.3);
   EXPECT_GT(stated.p95, 0.5);
+}
+
+// In penumbra the truth is an estimate, and what that is off by is not the lookups'.
+TEST_F(SurfaceErrorUnderAPlate, WhatTheTruthIsOffByIsNotStated) {
+  SurfaceError error(solved(), 1, 512);
+  std::vector<glm::vec3> found;
+  for (const auto& at : error.lookups()) {
+    const glm::dvec3 place(-0.5 + static_cast<double>(at.texel.x) / 16.0, -0.4,
+                           0.5 - static_cast<double>(at.texel.y) / 16.0);
+    const bool is_lit = at.surface == 0 && at.side == 0;
+    found.emplace_back(is_lit ? static_cast<float>(litAt(place) * openPart(place)) : 0.0F);
+  }
+  error.take(std::move(found));
+  error.setWantedDeviation(3e-3);
+  while (!error.advance(1e9)) continue;
+  EXPECT_LT(error.stated().total, 0.01);
+  EXPECT_LE(error.stated().deviation, 3e-3);
+  EXPECT_LT(error.stated().p95, 0.03);
 }
 
 TEST_F(SurfaceErrorUnderAPlate, UnderItThereIsNoLight) {

@@ -117,5 +117,18 @@ TEST_F(TexelDetailTest, WithoutLightTexelsAreFewer) {
   EXPECT_LT(chosen.texels, kTexels);
 }
 
+// What both neighbours have alike of noise no lookup averages: it is not the texels' fault.
+TEST_F(TexelDetailTest, NoiseThatNeighboursHaveInCommonIsNotThatOfTexels) {
+  constexpr float kOff = 1.0F;
+  auto second = light_;
+  for (auto& value : second) value += 2.0F * kOff;
+  const double square = 3.0 * kOff * kOff;  // of the mean of both halves
+  std::vector<SurfaceError::Measured> measured;
+  for (std::uint32_t s = 0; s < 3; ++s) measured.push_back({s, square, 1.0});
+  const auto alike = chooseDetail(*scene_.patches, {light_, second, {}}, measured, {0.02, 1e6});
+  const auto without = chooseDetail(*scene_.patches, {light_, light_, {}}, measured, {0.02, 1e6});
+  EXPECT_LT(alike.present, 0.4 * without.present);
+}
+
 }  // namespace
 }  // namespace radiosity::solver
