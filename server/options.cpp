@@ -91,6 +91,10 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_flag("--uniform{false}", o.solve.adaptive,
                "Texels of one size everywhere, --texels of them. Without it, and without --texel-size, the server "
                "chooses them, as few as meet the target where people look, finer where light wants it");
+  app.add_flag(
+      "--means", o.solve.texels_are_means,
+      "Texels of lightmaps hold the mean light of what they cover, for those who filter them in a way of their "
+      "own. Without it they hold what bilinear lookups come closest to the light with");
   app.add_option(
          "--link-memory", o.solve.link_memory_bytes,
          "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "

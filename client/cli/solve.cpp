@@ -41,7 +41,7 @@ struct SolveOptions {
   std::string visibility;        ///< empty: the server's choice
   std::string link_memory;       ///< as radiosityd takes it; empty: the server's choice
   std::string max_scene_memory;  ///< likewise
-  bool double_sided = false, uniform = false;
+  bool double_sided = false, uniform = false, means = false;
   Method method = Method::kGather;
   bool unlit = false, error_map = false, quiet = false;
 };
@@ -116,6 +116,7 @@ class Solve {
       start.arguments.insert(start.arguments.end(), {"--workers", std::to_string(options_.workers)});
     if (!options_.visibility.empty())
       start.arguments.insert(start.arguments.end(), {"--visibility", options_.visibility});
+    if (options_.means) start.arguments.emplace_back("--means");
     if (!options_.link_memory.empty())
       start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
     if (!options_.max_scene_memory.empty())
@@ -360,6 +361,8 @@ void addSolve(CLI::App& app, Run& run) {
       ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("METRES")
       ->excludes(texels);
+  command.add_flag("--means", options->means,
+                   "texels hold the mean light of what they cover, not what bilinear lookups are closest with");
   command.add_flag("--uniform", options->uniform,
                    "texels of one size everywhere, on which --error is met; without it, and without --texel-size, "
                    "texels are chosen, as few as meet --error where people look, finer where light wants it");

@@ -103,6 +103,8 @@ struct SolveSettings {
   bool double_sided = false;      ///< all materials are, whatever the scene says
   Method method = Method::kGather;
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
+  /// Texels hold the mean light of what they cover, and not what bilinear lookups come closest with (server option).
+  bool texels_are_means = false;
 
   bool operator==(const SolveSettings&) const = default;
   [[nodiscard]] bool choosesTexels() const { return radiosity::choosesTexels(adaptive, texel_size_m, method); }

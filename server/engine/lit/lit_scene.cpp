@@ -8,6 +8,7 @@
 #include "common/give_back.h"
 #include "common/task.h"
 #include "server/engine/lit/carried_light.h"
+#include "server/engine/lit/leaf_light.h"
 #include "server/scene/burial/burial_record.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/shading/emitters.h"
@@ -449,20 +450,7 @@ std::size_t LitScene::warningCount() const {
          (settings_.method == Method::kPaper ? 1 : 0);
 }
 
-/// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
-/// is: cutting it off only takes error away.
-scene::LeafLight LitScene::ownLight() const {
-  scene::LeafLight light{solver_->irradiance()};
-  for (auto& value : light.mean) value = glm::max(value, 0.0F);
-  if (settings_.method == Method::kPaper) {
-    light.is_shown_as_is = true;
-    return light;
-  }
-  light.difference = solver_->halfIrradiance(0);
-  const auto second = solver_->halfIrradiance(1);
-  for (std::size_t n = 0; n < second.size(); ++n) light.difference[n] -= second[n];
-  return light;
-}
+scene::LeafLight LitScene::ownLight() const { return leafLight(*solver_, settings_); }
 
 void LitScene::probeSurface(double seconds) {
   if (!surface_probe_.hasBegun()) {

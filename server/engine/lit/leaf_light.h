@@ -1,0 +1,14 @@
+// The light that a solver has now, as lightmaps want it. Solve thread.
+#pragma once
+
+#include "server/engine/engine.h"
+#include "server/scene/lightmap/texel_fit.h"
+#include "server/solver/solver.h"
+
+namespace radiosity::engine {
+
+/// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
+/// is: cutting it off only takes error away. Cost: three passes over the leaves.
+[[nodiscard]] scene::LeafLight leafLight(const solver::Solver& solver, const SolveSettings& settings);
+
+}  // namespace radiosity::engine
