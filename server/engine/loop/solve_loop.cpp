@@ -248,7 +248,7 @@ Result<solver::StepOutcome> SolveLoop::stepSolver() {
 }
 
 bool SolveLoop::isWantedElsewhere() const {
-  if (queue_.isPressing()) return true;
+  if (queue_.isPressing() || (load_ && load_->task()->isCancelled())) return true;
   // Without any light there would be nothing to end with.
   if (!settings_.time_limit_s || state_ != SolveState::kSolving || first_light_ || lit_->solver().shots() == 0)
     return false;
