@@ -55,6 +55,7 @@ class PutOff : public ::testing::Test {
 
 // Whoever asks without a pause only delays it: each time that nothing came of it, it is left alone twice as long.
 TEST_F(PutOff, aLongShotIsDoneInTheEndHoweverOftenSomebodyIsWaiting) {
+  start(gpu::Sight::kImages);
   transport_->setImpatience([] { return true; });
   auto batch = endless();
   batch.scatter.clear();
@@ -67,6 +68,53 @@ TEST_F(PutOff, aLongShotIsDoneInTheEndHoweverOftenSomebodyIsWaiting) {
   }
   EXPECT_EQ(taken, 1U);
   EXPECT_GT(tries, 1U) << "it took less than it is left alone for at first, and shows nothing";
+}
+
+// By rays nothing that was found is lost, so that it need not be left alone for longer and longer.
+TEST_F(PutOff, aLongShotByRaysGoesOnFromWhereItWas) {
+  auto batch = endless();
+  batch.scatter.clear();
+  batch.gather.resize(1);
+  batch.gather[0].point_count = 400;
+  std::vector<solver::LinkSample> whole, in_parts;
+  auto undisturbed = batch;
+  undisturbed.may_be_put_off = false;
+  ASSERT_TRUE(transport_->measure(undisturbed, [&](std::size_t, auto&& links) { whole.push_back(links); }));
+  transport_->setImpatience([] { return true; });
+  std::size_t tries = 0;
+  auto longest = Clock::duration::zero();
+  while (in_parts.empty() && ++tries < 10'000) {
+    const auto begun = Clock::now();
+    const auto done = transport_->measure(batch, [&](std::size_t, auto&& links) { in_parts.push_back(links); });
+    ASSERT_TRUE(done || done.error().code == ErrorCode::kCancelled);
+    longest = std::max(longest, Clock::now() - begun);
+  }
+  EXPECT_GT(tries, 2U) << "it took less than it is left alone for at first, and shows nothing";
+  ASSERT_EQ(in_parts.size(), 1U);
+  EXPECT_EQ(in_parts[0].irradiance, whole[0].irradiance);
+  EXPECT_EQ(in_parts[0].escaped, whole[0].escaped);
+  EXPECT_EQ(in_parts[0].absorbed, whole[0].absorbed);
+  EXPECT_LT(longest, std::chrono::seconds(10));
+  expectWorkersAsEver();
+}
+
+// What was begun is of no use to another shot.
+TEST_F(PutOff, anotherShotBeginsAnew) {
+  auto batch = endless();
+  batch.scatter.clear();
+  batch.gather.resize(1);
+  transport_->setImpatience([] { return true; });
+  ASSERT_FALSE(transport_->measure(batch, [](std::size_t, auto&&) { ADD_FAILURE() << "a shot is done"; }));
+  auto other = batch;
+  other.may_be_put_off = false;
+  other.gather[0].point_count = 3;
+  other.gather[0].receiver_jitter = {0.25F, 0.75F};
+  std::vector<solver::LinkSample> after, fresh;
+  ASSERT_TRUE(transport_->measure(other, [&](std::size_t, auto&& links) { after.push_back(links); }));
+  start(gpu::Sight::kRays);
+  ASSERT_TRUE(transport_->measure(other, [&](std::size_t, auto&& links) { fresh.push_back(links); }));
+  EXPECT_EQ(after[0].irradiance, fresh[0].irradiance);
+  EXPECT_EQ(after[0].escaped, fresh[0].escaped);
 }
 
 TEST_F(PutOff, aMeasurementInTheMiddleOfAShotEndsSoon) {

@@ -147,6 +147,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   std::array<Lost, 2> lost{};
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t half = both && 2 * i >= points.size() ? 1 : 0;
+    asked_ = {};
     askRays(shot, points[i], static_cast<std::uint32_t>(i), half);
     loseByRays(points[i], lost[half]);
   }

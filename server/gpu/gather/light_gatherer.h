@@ -42,8 +42,11 @@ class LightGatherer {
   void beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named = {});
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
             const HemicubeWeights& weights, const ViewWindow* window = nullptr);
-  /// The same by rays: what the light loses on all sides is found, whichever links are wanted.
+  /// The same by rays: what the light loses on all sides is found, whichever links are wanted. Interrupted, the same
+  /// look goes on from there when it is made again.
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point);
+  /// That are done since beginLinks().
+  [[nodiscard]] std::uint32_t lookCount() const { return look_count_; }
   /// Finds the places of some receivers, for windowOf() at all points of the shot.
   void findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named);
   /// What a look at these, and at boxes, can show; nothing where that is nearly all.
@@ -169,6 +172,10 @@ class LightGatherer {
   std::size_t weighed_ = 0;                   ///< of those lit: the others wait for their form factors
   Lost look_lost_;                            ///< of the looks since beginLinks
   std::uint32_t look_count_ = 0;
+  /// Of the look that is being made by rays: so many receivers, and edges, are through with it.
+  struct {
+    std::uint32_t receivers = 0, edges = 0;
+  } asked_;
   solver::Looks open_looks_;  ///< likewise: of them those that lost something
   std::vector<std::uint32_t> starts_;
   std::vector<glm::vec3> places_;  ///< of wanted receivers

@@ -93,8 +93,9 @@ void LightGatherer::beginEdges() {
 
 void LightGatherer::lookFromEdges(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                                   std::size_t half) {
-  for (auto& edge : edges_) {
+  for (; asked_.edges < edges_.size(); ++asked_.edges) {
     interruptionPoint();
+    auto& edge = edges_[asked_.edges];
     const auto i = edge.lit;
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     Draw draw(point.origin, at);

@@ -165,6 +165,7 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
   for (const auto i : std::span(lit_.doubtful.data(), doubts)) {
     if (!hidden(i, o, items, size)) visible_weight[i] += lit_.point_weight[i];
   }
+  asked_ = {};
   lookFromEdges(shot, point, half);
 }
 

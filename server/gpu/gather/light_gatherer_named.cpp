@@ -108,6 +108,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
   look_lost_ = {};
   open_looks_ = {};
   look_count_ = 0;
+  asked_ = {};
 }
 
 }  // namespace radiosity::gpu

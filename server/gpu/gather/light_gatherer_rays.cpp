@@ -94,6 +94,7 @@ void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeF
   loseByRays(point, look_lost_);
   if (look_lost_ != before) open_looks_.add(look_count_);
   ++look_count_;
+  asked_ = {};
 }
 
 void LightGatherer::askRays(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::uint32_t look,
@@ -116,14 +117,20 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
   float* visible_weight = lit_.visible_weight[half].data();
   geometry::WayQueue<std::uint32_t> ways(receivers_->rays());
   const auto tell = [&](std::uint32_t i) { visible_weight[i] += lit_.point_weight[i]; };
-  for (std::uint32_t i = 0; i < lit_count_; ++i) {
-    if (lit_.point_weight[i] <= 0.0F) continue;
-    interruptionPoint();
-    weight[i] += lit_.point_weight[i];
-    const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
-    const auto from = at + Receivers::kLift * normal;
-    const glm::vec3 light(lit_.light_x[i], lit_.light_y[i], lit_.light_z[i]);
-    ways.add(from, light + lift - from, receivers_->wayKey(key, at), i, tell);
+  auto& i = asked_.receivers;
+  try {
+    for (; i < lit_count_; ++i) {
+      if (lit_.point_weight[i] <= 0.0F) continue;
+      interruptionPoint();
+      weight[i] += lit_.point_weight[i];
+      const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
+      const auto from = at + Receivers::kLift * normal;
+      const glm::vec3 light(lit_.light_x[i], lit_.light_y[i], lit_.light_z[i]);
+      ways.add(from, light + lift - from, receivers_->wayKey(key, at), i, tell);
+    }
+  } catch (const Interrupted&) {
+    ways.flush(tell);
+    throw;
   }
   ways.flush(tell);
   lookFromEdges(shot, point, half);

@@ -31,6 +31,8 @@ class ShotCrew {
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
                                                           const solver::Transport::TakeLinks& take);
+  /// As ShotRunner's, of one hand: many take other shots each time.
+  [[nodiscard]] bool keepsPlace() const { return hands_.size() == 1 && hands_.front()->runner.keepsPlace(); }
   [[nodiscard]] const EglContext& context() const { return *renderers_->context; }
 
  private:

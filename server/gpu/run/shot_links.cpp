@@ -15,6 +15,7 @@ Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, con
   if (sight_ == Sight::kRays && shots.mode != solver::LinkMode::kPaperMipmap) {
     measureByRays(shots, take, counters);
   } else {
+    begun_.reset();
     measureGather(shots, take, counters);
   }
   measureScatter(shots, take, counters);
@@ -57,13 +58,27 @@ void ShotRunner::measureByRays(const ShotSpan& shots, const solver::Transport::T
   for (std::size_t i = 0; i < shots.gather.size(); ++i) {
     const auto& shot = shots.gather[i];
     if (shot.point_count == 0) continue;
-    gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
-    for (const auto& point : shots.points.subspan(shot.first_point, shot.point_count)) gatherer_.look(shot, point);
+    if (auto wanted = begunShot(shots, shot); begun_ != wanted) {
+      begun_.reset();
+      gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
+      begun_ = std::move(wanted);
+    }
+    while (gatherer_.lookCount() < shot.point_count)
+      gatherer_.look(shot, shots.points[shot.first_point + gatherer_.lookCount()]);
     solver::LinkSample links;
     gatherer_.finishLinks(shot, links, counters);
+    begun_.reset();
     take(i, std::move(links));
   }
   counters.gather_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+ShotRunner::BegunShot ShotRunner::begunShot(const ShotSpan& shots, const solver::GatherShot& shot) {
+  const auto points = shots.points.subspan(shot.first_point, shot.point_count);
+  const auto receivers = shots.receivers.subspan(shot.first_run, shot.run_count);
+  BegunShot begun{shot, {points.begin(), points.end()}, {receivers.begin(), receivers.end()}};
+  begun.shot.first_point = begun.shot.first_run = begun.shot.first_box = 0;
+  return begun;
 }
 
 void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,

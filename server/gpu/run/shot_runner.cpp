@@ -106,6 +106,7 @@ void ShotRunner::setScene(const std::shared_ptr<const Receivers>& receivers, Sig
   lamps_ = LampGatherer(receivers);
   accumulator_ = ScatterAccumulator(receivers->patches().nodeCount());
   gatherer_ = LightGatherer(receivers);
+  begun_.reset();
   link_store_.reset();
 }
 
@@ -115,6 +116,7 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   if (shots.mode == solver::LinkMode::kPaperMipmap) {
     if (auto prepared = images_.preparePaper(); !prepared) return tl::unexpected(prepared.error());
   }
+  begun_.reset();
   solver::TransportCounters counters;
   scatter(shots, sink, counters);
   for (const auto& shot : shots.lamps) lamps_.gather(shot, shots.webs, shots.flux_scale, sink, counters);

@@ -44,8 +44,18 @@ class ShotRunner {
   /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
                                                           const solver::Transport::TakeLinks& take);
+  /// measure() was interrupted in a shot that the next one goes on with from there, if it comes first in it.
+  [[nodiscard]] bool keepsPlace() const { return begun_.has_value(); }
 
  private:
+  /// A shot with all that its links follow from.
+  struct BegunShot {
+    solver::GatherShot shot;  ///< that begins where the spans do
+    std::vector<solver::HemicubeFrame> points;
+    std::vector<solver::NodeRun> receivers;
+    bool operator==(const BegunShot&) const = default;
+  };
+  [[nodiscard]] static BegunShot begunShot(const ShotSpan& shots, const solver::GatherShot& shot);
   void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
   void measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                      solver::TransportCounters& counters);
@@ -61,6 +71,7 @@ class ShotRunner {
   Sight sight_ = Sight::kImages;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
+  std::optional<BegunShot> begun_;  ///< that gatherer_ is at, by rays
   std::shared_ptr<const Receivers> receivers_;
   std::optional<FluxStore> link_store_;
   PunctualGatherer punctual_;

@@ -93,7 +93,7 @@ class Worker {
       interruptionPoint();
       counters = head.measure != 0 ? crew_->measure(shots, pack) : crew_->run(shots, *sink_);
     } catch (const Interrupted&) {
-      return replyDone({head.chunk, 1, taken, {}}, links);
+      return replyDone({head.chunk, crew_->keepsPlace() ? kKeepsPlace : 1, taken, {}}, links);
     }
     if (!counters) return tl::unexpected(counters.error());
     return replyDone({head.chunk, 0, taken, *counters}, links);

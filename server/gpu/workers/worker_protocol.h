@@ -50,10 +50,14 @@ struct ChunkBody {
 };
 struct ChunkDoneBody {
   std::uint64_t chunk = 0;
-  std::uint64_t put_off = 0;  ///< 1: links are those of its first `shots` alone, and of a run nothing came
+  /// 1: links are those of its first `shots` alone, and of a run nothing came; 2: so, and the next shot goes on from
+  /// where it is when it comes again.
+  std::uint64_t put_off = 0;
   std::uint64_t shots = 0;
   solver::TransportCounters counters;
 };
+
+inline constexpr std::uint64_t kKeepsPlace = 2;  ///< ChunkDoneBody::put_off
 
 /// Bound on a message's body; a longer one is a broken peer.
 inline constexpr std::size_t kMaxBody = std::size_t{1} << 30;

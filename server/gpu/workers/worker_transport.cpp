@@ -208,7 +208,7 @@ class WorkerTransport final : public solver::Transport {
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_fits_.error());
     deaths_ = 0;
     ++batch_;
-    put_off_ = lacks_ = false;
+    put_off_ = lacks_ = keeps_place_ = false;
     gather_shots_ = batch.gather.size();
     chunks_ = cutBatch(batch, {triangles_, nodes_}, {slots_.size(), hands_});
     queue_.clear();
@@ -222,7 +222,7 @@ class WorkerTransport final : public solver::Transport {
     if (!done) killAll();                         // what the workers have of this batch is void; so are they
     for (auto& slot : slots_) slot.done.clear();  // who dies from here on takes nothing of it into the grave
     // Whoever asks over and over must not keep a long shot from ever being done.
-    const bool is_in_vain = lacks_ && (take_ == nullptr || next_taken_ == 0);
+    const bool is_in_vain = lacks_ && !keeps_place_ && (take_ == nullptr || next_taken_ == 0);
     undisturbed_ = is_in_vain ? std::min(2 * undisturbed_, kMostUndisturbed) : Clock::duration(kUndisturbed);
     if (!done || !lacks_) return done;
     for (auto& slot : slots_) {
@@ -368,6 +368,7 @@ class WorkerTransport final : public solver::Transport {
     }
     const bool is_put_off = put_off_ && report.put_off != 0;
     lacks_ |= is_put_off;
+    keeps_place_ |= is_put_off && report.put_off == kKeepsPlace;
     const auto& chunk = chunks_[report.chunk];
     if (take_ != nullptr && !takeLinks(from, chunk, is_put_off ? std::min(report.shots, chunk.count) : chunk.count)) {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
@@ -459,6 +460,7 @@ class WorkerTransport final : public solver::Transport {
   std::uint64_t batch_ = 0;
   Clock::duration undisturbed_ = kUndisturbed;            ///< kUndisturbed, or longer
   bool put_off_ = false, lacks_ = false;                  ///< this batch; and some of it was not done
+  bool keeps_place_ = false;                              ///< a worker is to go on in the middle of a shot
   const TakeLinks* take_ = nullptr;                       ///< where links are wanted
   std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before
   std::size_t next_taken_ = 0;

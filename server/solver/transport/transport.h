@@ -32,6 +32,7 @@ inline constexpr std::uint32_t kWeightOne = 1U << 30;
 struct HemicubeFrame {
   glm::vec3 origin, normal, tangent;
   std::uint32_t lattice = 0;  ///< index of the subpixel offset, < kLatticeSide^2
+  bool operator==(const HemicubeFrame&) const = default;
 };
 
 /// Scatter: a full hemicube of mip-level node IDs; each pixel delivers flux x weight to the node it names.
@@ -50,6 +51,7 @@ inline constexpr std::uint32_t kBothHalves = 2;
 /// Consecutive nodes.
 struct NodeRun {
   std::uint32_t first_node, count;
+  bool operator==(const NodeRun&) const = default;
 };
 
 /// A set of looks, each from one point, by number; of those that are too many all or none are in it.
@@ -73,6 +75,7 @@ struct Looks {
     }
     return looks;
   }
+  bool operator==(const Looks&) const = default;
 };
 
 /// Gather: light of one convex planar polygon of uniform radiosity at every leaf. For each point on the polygon an item
@@ -106,6 +109,7 @@ struct GatherShot {
   /// the points see these boxes or the receivers, and may be left out elsewhere. 0: everywhere.
   std::uint32_t first_box = 0, box_count = 0;
   Looks open_looks;  ///< points of which all that escapes and is absorbed is wanted nevertheless
+  bool operator==(const GatherShot&) const = default;
 };
 
 /// Receiving points inside a full leaf over which a shot of light without extent is averaged, as (u, v) in [0, 1)^2.
