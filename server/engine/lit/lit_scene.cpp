@@ -364,8 +364,10 @@ std::vector<scene::LightmapPage> LitScene::directPages() const {
   return scene::assemblePages(*patches_, direct);
 }
 
+/// The light over few links and rays is solved for sooner than anyone sees that it is late.
 bool LitScene::showDirectLight() {
-  if (showsOwnLight() || !solver_->isRepairing()) return false;
+  const bool is_slow = solver_->isUnsettled() && solver_->linkCounters().bytes >= slow_links_;
+  if (showsOwnLight() || !(solver_->isRepairing() || is_slow)) return false;
   makeOldDirectPages();
   if (old_direct_.empty()) return false;
   const auto fresh = directPages();

@@ -183,7 +183,7 @@ class LitScene {
     old_direct_.clear();
     until_settled_ = false;
   }
-  /// From how many bytes of links on an edit of light shows the lights' own part first: the light over fewer is solved
+  /// From how many bytes of links and rays on an edit shows the lights' own part first: the light over fewer is solved
   /// for sooner than anyone sees that it is late.
   void setSlowLinks(std::size_t bytes) { slow_links_ = bytes; }
   /// While an edit of geometry is being solved, as soon as the lights' own part of the new light is known: shows it in

@@ -82,7 +82,6 @@ TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
   engine::SolveSettings settings;
   settings.target_error = 0.03;
   settings.texels = 600;
-  settings.link_memory_bytes = 1'000'000;  // too little for rays, which would be done with everything at once
   RayTransport transport(400);
   const auto former = valueOf(LitScene::make(roomDocument(), settings, transport));
   auto& before = *former;
@@ -99,6 +98,7 @@ TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
   ASSERT_TRUE(after.upload());
   (void)after.succeed(before);
   ASSERT_TRUE(after.keepsLayoutOf(before));
+  after.setSlowLinks(0);
   after.fadeFrom(before, true);
   after.startSolve(&before);
   EXPECT_FALSE(after.showDirectLight()) << "nothing of the new light is known";
