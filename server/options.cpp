@@ -97,8 +97,8 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       "own. Without it they hold what bilinear lookups come closest to the light with");
   app.add_option(
          "--link-memory", o.solve.link_memory_bytes,
-         "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "
-         "target error; 0: remember none")
+         "Memory for remembered links and rays, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above "
+         "its target error; a scene whose rays do not fit, as with 0, is solved by averaged shooting")
       ->transform(CLI::AsSizeValue(false))
       ->capture_default_str();
   app.add_option("--max-scene-memory", o.max_scene_bytes,

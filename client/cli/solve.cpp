@@ -400,8 +400,8 @@ void addSolve(CLI::App& app, Run& run) {
                          ->type_name("HOW");
   auto* memory = command
                      .add_option("--link-memory", options->link_memory,
-                                 "memory for links of the private server, such as 256MiB (default: 1GiB); when it is "
-                                 "used up the solve ends above its error")
+                                 "memory for links and rays of the private server, such as 256MiB (default: 1GiB); "
+                                 "when it is used up the solve ends above its error")
                      ->check(CLI::AsSizeValue(false).description(""))
                      ->type_name("SIZE");
   auto* scene_memory =

@@ -1,6 +1,7 @@
-// Progressive radiosity of one scene. Two ways: LinkedSolver remembers every link that a hemicube found (the default);
-// ShootingSolver forgets them, as Lum, Ma and Max (2002) do, for the mode that follows their paper and for scenes whose
-// links would not fit in memory. Owned by the solve loop; one thread. Carries no light itself: that is the Transport's.
+// Progressive radiosity of one scene. Three ways: LinkedSolver (the default) remembers the links of lamps, and gathers
+// reflected light by rays that it remembers, too; ShootingSolver remembers neither, and averages whole rounds of shots,
+// where memory is scarce; PaperSolver follows Lum, Ma and Max (2002). Owned by the solve loop; one thread. Carries no
+// light itself: that is the Transport's.
 #pragma once
 
 #include <cstdint>
@@ -28,16 +29,11 @@ struct SolverSettings {
   /// Whether light that varies within leaves is looked for, stated, and corrected. Without, leaves are lumped: each
   /// shoots its mean, and that alone is what the error is about.
   bool within_leaves = true;
-  /// Bytes that remembered links never exceed. When they are used up no more nodes become shooters; a scene that could
-  /// not even have a few hundred, or whose lights alone would take half of it, is solved without.
+  /// Bytes that remembered links and rays never exceed, half of it each. When they are used up the solve ends above its
+  /// target. A scene whose rays would not fit, or whose lights alone would take half of it, is solved by averaged
+  /// shooting, which remembers neither.
   std::size_t link_memory = std::size_t{1} << 30;
-  /// How reflected light comes to the leaves: by rays from the leaves (LeafGather), but for what is bright and small,
-  /// unless half of link_memory is too little for them; or over links from shooters. By rays 2 % take half of the time
-  /// in a box of 17 polygons, and a tenth in a room of thousands; in furnaces, whose links are exact but for where
-  /// leaves look from, they take from half to one and a third of it, and the error is a tenth.
-  enum class Reflected { kByRays, kByLinks };
-  Reflected reflected = Reflected::kByRays;
-  /// A solve over links ends, whatever its error, so many rounds after the last edit or its start: no round helps then.
+  /// A gathered solve ends, whatever its error, so many rounds after the last edit or its start: no round helps then.
   std::uint32_t max_rounds = 100'000;
   PlannerSettings planner;
 };
@@ -55,7 +51,7 @@ enum class SolveLimit {
   kNone,
   kLinkMemory,  ///< SolverSettings::link_memory
   kRounds,      ///< as many rounds as sums have room for
-  kPatches,     ///< every node is split to its leaves, or no sample can lower the error any more
+  kPatches,     ///< no sample can lower the error any more
   kWithin,      ///< light that varies within leaves
   kRays,        ///< every leaf has as many rays as it may have
 };
@@ -122,8 +118,6 @@ class Solver {
   /// By node, level 0: the level of the node that last shot for this leaf; kNeverShot where none has.
   [[nodiscard]] virtual std::vector<std::uint8_t> shotLevels() const = 0;
   static constexpr std::uint8_t kNeverShot = 255;
-  /// By node, level 0: how the square of the residual is spread over the leaves; area-weighted mean one. Empty: evenly.
-  [[nodiscard]] virtual std::vector<float> residualShape() const { return {}; }
   /// Squares of what of error().sampling the halves do not differ by, lux^2 by channel and node of level 0; empty: no
   /// such error is known.
   [[nodiscard]] virtual std::vector<glm::vec3> commonErrorSquared() const { return {}; }

@@ -67,8 +67,6 @@ void imageSkip(benchmark::State& state) {
   state.counters["empty_faces"] = a_shot(counters.faces_empty);
 }
 
-using Reflected = solver::SolverSettings::Reflected;
-
 /// What can be switched in a whole solve; the counters say what it changed.
 struct Variant {
   const char* name;
@@ -77,14 +75,6 @@ struct Variant {
 const std::vector<Variant>& variants() {
   static const std::vector<Variant> kAll{
       {"default", [](auto&) {}},
-      {"reflected light by rays", [](auto& s) { s.reflected = Reflected::kByRays; }},
-      {"over links", [](auto& s) { s.reflected = Reflected::kByLinks; }},
-      {"over links, small item buffers (N 32)",
-       [](auto& s) { s.reflected = Reflected::kByLinks, s.planner.node_resolution = 32; }},
-      {"over links, large item buffers (N 128)",
-       [](auto& s) { s.reflected = Reflected::kByLinks, s.planner.node_resolution = 128; }},
-      {"over links, four times the first shooters",
-       [](auto& s) { s.reflected = Reflected::kByLinks, s.planner.first_shooters *= 4; }},
       {"links forgotten", [](auto& s) { s.link_memory = 0; }},
       {"links forgotten, reflected light scattered",
        [](auto& s) { s.link_memory = 0, s.planner.gather_nodes = false; }},

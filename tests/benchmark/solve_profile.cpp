@@ -2,7 +2,7 @@
 // own estimate and the truth against the path tracer on the same leaves.
 //
 //   solve_profile SCENE.glb [--seconds 5] [--error 0.002] [--texels 16000] [--samples 4096] [--workers 1]
-//   [--reference FILE] [--reflected links|rays]
+//   [--reference FILE]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -297,8 +297,6 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   settings.target_error = number("--error", 0.002);
   settings.seed = static_cast<std::uint64_t>(number("--seed", 1));
   settings.method = options.count("--paper") != 0 ? Method::kPaper : Method::kGather;
-  if (options["--reflected"] == "links") settings.reflected = solver::SolverSettings::Reflected::kByLinks;
-  if (options["--reflected"] == "rays") settings.reflected = solver::SolverSettings::Reflected::kByRays;
   settings.planner.gather_nodes = number("--gather", 1) != 0.0;  // 0: reflected light is scattered instead
   settings.planner.first_shooters = static_cast<std::uint32_t>(number("--shooters", settings.planner.first_shooters));
   settings.planner.resolution = static_cast<std::uint32_t>(number("--resolution", settings.planner.resolution));

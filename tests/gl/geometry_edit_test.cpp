@@ -19,7 +19,13 @@ using solver::LinkedSolver;
 using test::GeometryEdit;
 using test::replaced;
 
-TEST_F(GeometryEdit, MovesMendTheLinksThatMeasuringAllFinds) {
+/// Lamps shoot, and leaves that are as bright.
+class GlintEdit : public GeometryEdit {
+ protected:
+  GlintEdit() { has_glints_ = true; }
+};
+
+TEST_F(GlintEdit, MovesMendTheLinksThatMeasuringAllFinds) {
   start(test::blockRoom());
   expectMendedIsMeasured(replaced("/nodes/2/translation", {0.75, 0.0, 0.65}));
   expectMendedIsMeasured(replaced("/nodes/2/translation", {0.6, 0.5, 0.6}));
@@ -30,7 +36,7 @@ TEST_F(GeometryEdit, MovesMendTheLinksThatMeasuringAllFinds) {
 
 // Images of a light's later samples are twice as wide, whoever takes them: all looked at once more, where nothing has
 // changed, is what the solve saw.
-TEST_F(GeometryEdit, LinksMeasuredOnceMoreAreTheSame) {
+TEST_F(GlintEdit, LinksMeasuredOnceMoreAreTheSame) {
   settings_.planner.coarse_light_samples = 1;
   settings_.planner.light_points = 32;  // four samples
   start(test::blockRoom());
@@ -42,7 +48,7 @@ TEST_F(GeometryEdit, LinksMeasuredOnceMoreAreTheSame) {
   expectSameLinks(*again, *second, *before_.patches);
 }
 
-TEST_F(GeometryEdit, WhatIsGoneOrAddedMendsTheLinksThatMeasuringAllFinds) {
+TEST_F(GlintEdit, WhatIsGoneOrAddedMendsTheLinksThatMeasuringAllFinds) {
   start(test::blockRoom());
   expectMendedIsMeasured(replaced("/nodes/2/extensions/KHR_node_visibility/visible", false));
   expectMendedIsMeasured(
@@ -54,7 +60,7 @@ TEST_F(GeometryEdit, WhatIsGoneOrAddedMendsTheLinksThatMeasuringAllFinds) {
 
 // Where receivers look past their planes' edges, and at floor of which part is covered: beside a wall, a hair's breadth
 // further, thin as a leaf, and tilted into the floor.
-TEST_F(GeometryEdit, WhatStandsBesideAWallMendsTheLinksThatMeasuringAllFinds) {
+TEST_F(GlintEdit, WhatStandsBesideAWallMendsTheLinksThatMeasuringAllFinds) {
   settings_.seed = 3;
   start(test::blockRoom());
   expectMendedIsMeasured(replaced("/nodes/2/translation", {0.301, 0.0, 0.302}));
@@ -96,7 +102,12 @@ class ChairEdit : public test::ChairRoom {
   }
 };
 
-TEST_F(ChairEdit, MendsTheLinksThatMeasuringAllFinds) {
+class GlintChairEdit : public ChairEdit {
+ protected:
+  GlintChairEdit() { has_glints_ = true; }
+};
+
+TEST_F(GlintChairEdit, MendsTheLinksThatMeasuringAllFinds) {
   // With these seeds something that was moved far behind a leaf once decided whether that was lit.
   for (const std::uint64_t seed : {1U, 3U, 6U, 8U}) {
     SCOPED_TRACE(seed);
@@ -105,7 +116,7 @@ TEST_F(ChairEdit, MendsTheLinksThatMeasuringAllFinds) {
   }
 }
 
-TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
+TEST_F(GlintChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
   const auto after = edited(before_, move_);
   const auto first = solved(before_), second = solved(before_);
   settings_.target_error = 0.1;  // so that no other samples are wanted
@@ -211,7 +222,7 @@ TEST_F(ChairEdit, LooksAgainAtWhatManyEditsMadeNoLongerLittle) {
   EXPECT_TRUE(fell) << "at " << most;
 }
 
-TEST_F(ChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {
+TEST_F(GlintChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {
   const auto after = edited(before_, move_);
   const auto loose = solved(before_), tight = solved(before_);
   const auto map = mapOf(before_, after);
@@ -242,10 +253,7 @@ TEST_F(ChairEdit, LightsLookWithFewPointsFirstWhereTheShadowsMayBeThatRough) {
   const auto rough = early(*loose, 2.0 * error), fine = early(*tight, 1.01 * error);
   EXPECT_GT(unlikeLights(*rough, *exact, *after.patches), 0U);
   EXPECT_FALSE(rough->directIrradiance().empty()) << "it is shown";
-  ASSERT_TRUE(fine->step());
-  EXPECT_TRUE(fine->isRepairing()) << "with more points";
-  while (fine->isRepairing()) ASSERT_TRUE(fine->step());
-  EXPECT_LT(unlikeLights(*fine, *exact, *after.patches), unlikeLights(*rough, *exact, *after.patches));
+  EXPECT_GT(fine->linkCounters().own_looks, rough->linkCounters().own_looks) << "of leaves that points leave unsure";
   ASSERT_TRUE(rough->step());
   EXPECT_FALSE(rough->isRepairing());
   finish(*rough);
@@ -253,7 +261,7 @@ TEST_F(ChairEdit, LightsLookWithFewPointsFirstWhereTheShadowsMayBeThatRough) {
   EXPECT_EQ(unlikeLights(*rough, *exact, *after.patches), 0U) << "in the end";
 }
 
-TEST_F(ChairEdit, OfASceneThatIsBehindCountsWhatWaitedForEarlierEdits) {
+TEST_F(GlintChairEdit, OfASceneThatIsBehindCountsWhatWaitedForEarlierEdits) {
   const auto middle = edited(before_, move_);
   auto further = move_;
   further[0]["value"][0] = further[0]["value"][0].get<double>() + 0.15;
@@ -291,7 +299,7 @@ TEST_F(ChairEdit, WhileItsLampIsOffIsMeasuredWhenItIsOn) {
   EXPECT_LT(difference(early, *exact, *after.patches), 0.3 * settings_.target_error);
 }
 
-TEST_F(GeometryEdit, EditsThatOvertakeEachOtherMendWhatTheyAllChanged) {
+TEST_F(GlintEdit, EditsThatOvertakeEachOtherMendWhatTheyAllChanged) {
   start(test::blockRoom());
   const auto middle = edited(before_, replaced("/nodes/2/translation", {0.9, 0.3, 0.65}));
   const auto after = edited(middle, replaced("/nodes/2/translation", {1.2, 0.0, 1.1}));
@@ -305,7 +313,7 @@ TEST_F(GeometryEdit, EditsThatOvertakeEachOtherMendWhatTheyAllChanged) {
   expectSameLinks(*mended, *successor(*second, after, all), *after.patches);
 }
 
-TEST_F(GeometryEdit, ThereAndBackEndsWithTheSameLinks) {
+TEST_F(GlintEdit, ThereAndBackEndsWithTheSameLinks) {
   start(test::blockRoom());
   const auto away = edited(before_, replaced("/nodes/2/translation", {1.1, 0.2, 0.65}));
   const auto back = edited(away, replaced("/nodes/2/translation", before_.document.gltf["nodes"][2]["translation"]));

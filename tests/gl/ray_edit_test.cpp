@@ -17,8 +17,6 @@ using test::replaced;
 
 class RayEdit : public test::ChairRoom {
  protected:
-  RayEdit() { settings_.reflected = solver::SolverSettings::Reflected::kByRays; }
-
   struct Half {
     const solver::LeafSights& sights;
     std::size_t half;

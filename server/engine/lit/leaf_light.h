@@ -7,8 +7,8 @@
 
 namespace radiosity::engine {
 
-/// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
-/// is: cutting it off only takes error away. Cost: three passes over the leaves.
+/// Noise leaves single leaves a little darker than black. Nothing is: cutting it off only takes error away. Cost: three
+/// passes over the leaves.
 [[nodiscard]] scene::LeafLight leafLight(const solver::Solver& solver, const SolveSettings& settings);
 
 }  // namespace radiosity::engine

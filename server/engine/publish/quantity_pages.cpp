@@ -31,8 +31,7 @@ std::vector<glm::vec3> radiosity(const LitScene& lit) {
 std::vector<glm::vec3> errorSquared(const LitScene& lit) {
   const auto& solver = lit.solver();
   return solver::texelErrorSquared(lit.patches(), solver.halfIrradiance(0), solver.halfIrradiance(1),
-                                   solver.irradiance(), solver.error(), solver.residualShape(),
-                                   solver.commonErrorSquared());
+                                   solver.irradiance(), solver.error(), solver.commonErrorSquared());
 }
 
 /// Of each side, away from the surface.

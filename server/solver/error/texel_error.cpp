@@ -47,8 +47,7 @@ glm::dvec3 meanSquare(const scene::PatchScene& patches, const std::vector<Side>&
 
 std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::span<const glm::vec3> first,
                                          std::span<const glm::vec3> second, std::span<const glm::vec3> mean,
-                                         const ErrorParts& stated, std::span<const float> residual_shape,
-                                         std::span<const glm::vec3> common) {
+                                         const ErrorParts& stated, std::span<const glm::vec3> common) {
   std::vector<glm::vec3> squares(patches.nodeCount(), glm::vec3(0.0F));
   const auto sides = makeSides(patches);
   const auto reach = common.empty() ? kReach : kSmoothReach;
@@ -70,8 +69,7 @@ std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (area[leaf] <= 0.0) continue;
       const auto node = side.first_node + leaf;
-      const double share = residual_shape.empty() ? 1.0 : static_cast<double>(residual_shape[node]);
-      squares[node] = glm::vec3(shared[leaf] + share * residual + variation);
+      squares[node] = glm::vec3(shared[leaf] + residual + variation);
       if (!common.empty()) squares[node] += common[node];
     }
   }

@@ -17,14 +17,12 @@ constexpr double kSolved = 1e-6;
 constexpr int kMaxSweeps = 400;
 /// No more flux than this many times what is emitted can be on its way (reflectance is at most 0.9999).
 constexpr double kMostInterreflection = 1e5;
-/// Noise of signed links makes single nodes a little darker than black; so much of all light it never is.
+/// Noise makes single nodes a little darker than black; so much of all light it never is.
 constexpr double kMostDarkness = 0.05;
 /// Leaves whose links are looked at between two looks at the clock.
 constexpr std::size_t kLeavesAtOnce = std::size_t{1} << 21U;
 /// Columns whose entries are found together: as many as lie in a line of the cache or two.
 constexpr std::uint32_t kColumnsAtOnce = 32;
-/// Children that have this part of a node's area are all of them.
-constexpr double kWhole = 1.0 - 1e-9;
 constexpr std::size_t kLanes = 8;
 
 /// Sum of products in kLanes partial sums, so that it vectorises with the same bits everywhere. In double precision:
@@ -88,33 +86,10 @@ bool LinkSystem::advance(double seconds) {
   return halves_[0].done && halves_[1].done;
 }
 
-/// By the points that each has: `own` of all shooters.
-void LinkSystem::shareAmongChildren(std::size_t h) {
-  struct Below {
-    double area = 0.0, variance = 0.0;  ///< of the children, that of one point from all of the parent being area^2
-  };
-  std::vector<Below> below(shooters_.size());
-  for (std::size_t n = shooters_.size(); n-- > 0;) {
-    auto& shooter = shooters_[n];
-    shooter.own[h] = 1.0;
-    if (shooter.isLight()) continue;
-    double points = shooter.weight[h] == 1.0 ? shooter.column[h].points() : 0.0;
-    if (below[n].area > kWhole * shooter.area) {
-      const double further = shooter.area * shooter.area / below[n].variance;
-      shooter.own[h] = points / (points + further);
-      points += further;
-    }
-    if (points <= 0.0 || shooter.parent == scene::kNone) continue;
-    below[shooter.parent].area += shooter.area;
-    below[shooter.parent].variance += shooter.area * shooter.area / points;
-  }
-}
-
 /// From what was sent before.
 void LinkSystem::beginHalf(std::size_t h) {
   Half& half = halves_[h];
   const std::size_t count = shooters_.size();
-  shareAmongChildren(h);
   half.shining = {};
   half.area = 0.0;
   std::vector<double> area(count, 0.0);
@@ -126,9 +101,7 @@ void LinkSystem::beginHalf(std::size_t h) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto i = static_cast<int>(c);
       start[c][n] = static_cast<double>(shooter.sent[h][i]);
-      if (shooter.isLight()) half.shining[c] += shooter.area * start[c][n];
-      if (!shooter.isLight() && shooter.parent == scene::kNone)
-        half.shining[c] += shooter.area * static_cast<double>(emission_mean_[n][i]);
+      half.shining[c] += shooter.area * (shooter.isLight() ? start[c][n] : static_cast<double>(emission_mean_[n][i]));
     }
   }
   std::array<double, 3> tolerance{};
@@ -180,7 +153,6 @@ bool LinkSystem::isPhysical(const Half& half) const {
       if (shooters_[m].isLight()) continue;
       const double mean = half.mean[c][m];
       if (!std::isfinite(mean)) return false;
-      if (shooters_[m].parent != scene::kNone) continue;
       (mean > 0.0 ? bright : dark) += shooters_[m].area * std::abs(mean);
       area += shooters_[m].area;
       darkest = std::max(darkest, -mean);
@@ -226,10 +198,7 @@ void LinkSystem::sweep(std::size_t h, Gmres<double>::Vectors& x, bool affine) {
       double mean = dotDouble(links, half.sent[c].data(), count);
       if (row.count == 1) mean *= static_cast<double>(reflectance_mean_[m][i]);
       if (affine) mean += static_cast<double>(emission_mean_[m][i]);
-      half.mean[c][m] = mean;
-      x[c][m] = mean;
-      if (shooter.parent != scene::kNone)
-        x[c][m] -= half.mean[c][shooter.parent] - (1.0 - shooters_[shooter.parent].own[h]) * x[c][shooter.parent];
+      half.mean[c][m] = x[c][m] = mean;
       half.sent[c][m] = shooter.carried(h) * x[c][m];
     }
   }

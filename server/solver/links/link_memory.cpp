@@ -124,13 +124,9 @@ bool LinkMemory::isMostlyRows(const LinkSystem& system) const {
   return matrixBytes(rows, system.shooters().size()) > bytes_ / 2;
 }
 
-bool LinkMemory::takeShooters(std::span<const Shooter> shooters, std::size_t columns, const LinkSystem& system) {
-  std::size_t links = 0, rows = rows_;
-  for (const auto& shooter : shooters) {
-    links += columns * shooter.most_bytes;
-    rows += system.rowsOf(shooter.place.side);
-  }
-  const std::size_t count = shooters_ + shooters.size();
+bool LinkMemory::takeShooter(const Shooter& shooter, std::size_t columns, const LinkSystem& system) {
+  const std::size_t links = columns * shooter.most_bytes, rows = rows_ + system.rowsOf(shooter.place.side);
+  const std::size_t count = shooters_ + 1;
   const std::size_t matrix = matrixBytes(rows, count) - matrixBytes(rows_, shooters_);
   if (taken_ + links + matrix > bytes_ - bytes_ / kGrowthPart) {
     full_ = true;

@@ -16,11 +16,8 @@ namespace radiosity::solver {
 
 class LinkMemory {
  public:
-  /// `bytes`: SolverSettings::link_memory.
+  /// `bytes`: what of SolverSettings::link_memory rays leave.
   LinkMemory(const scene::PatchScene& patches, const std::vector<Side>& sides, std::size_t bytes);
-
-  /// So much of it is for links: rays have the rest. Before the first plan.
-  void limit(std::size_t bytes) { bytes_ = bytes; }
 
   /// Bytes that a column of links can come to take: two for each leaf of the sides that can be seen from there. Those
   /// of a planar side are in front of it; a curved one may see all. Cost: O(sides), for a side only the first time.
@@ -33,9 +30,9 @@ class LinkMemory {
 
   /// A plan begins: what `system` has is taken. Its rows must be up to date.
   void begin(const LinkSystem& system);
-  /// New shooters of nodes, with a column in as many halves as said; all of them or none. False: there is no room. They
-  /// leave some for the samples of those that are there.
-  [[nodiscard]] bool takeShooters(std::span<const Shooter> shooters, std::size_t columns, const LinkSystem& system);
+  /// A new shooter of a node, with a column in as many halves as said. False: there is no room. It leaves some for the
+  /// samples of those that are there.
+  [[nodiscard]] bool takeShooter(const Shooter& shooter, std::size_t columns, const LinkSystem& system);
   /// A sample in a half of a shooter that is there.
   [[nodiscard]] bool takeSample(const Shooter& shooter, std::size_t half);
 

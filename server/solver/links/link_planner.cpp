@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <queue>
 #include <tuple>
 
@@ -20,8 +19,6 @@ constexpr double kMaxWeight = 20.0;
 constexpr double kPartialShare = 0.06;
 /// Light that only differs between the leaves of a node cancels at a distance and counts near by.
 constexpr double kVariationWorth = 0.1;
-/// Square of the part of a node's links to its near receivers that feels what varies inside it.
-constexpr double kVariation = 0.5;
 /// First samples of a scattered node.
 constexpr std::uint32_t kScatteredPoints = 4;
 /// Points on all lights together in the first wave and half, where some have fewer than kLightPoints.
@@ -31,15 +28,13 @@ constexpr std::uint32_t kMostFirstPoints = 128;
 constexpr double kLightCost = 0.7, kPointCost = 0.65;
 /// So many samples' worth of what is usual is mixed into what is found of a shooter.
 constexpr double kPrior = 1.0;
-/// A short wave brings a light at most so many samples, and a node so many points; and one that doubles them. In the
-/// room of 402 polygons, where the equation takes six times as long as a short wave, 0.33 % take 5.7 s instead of 10.
-constexpr std::uint32_t kMostOfShortWave = 8, kMostOfWave = 512;
+/// A wave brings a light at most so many samples, and a node so many points. It doubles what there is, since the
+/// equation over all rays, which follows, takes longer than most waves.
+constexpr std::uint32_t kMostOfWave = 512;
 
 /// A wave ends where it is likely to bring the error to this part of the target: the spreads that it goes by are
 /// uncertain themselves, and the largest are rather too large.
 constexpr double kSurelyBelow = 0.85;
-/// Of what varies inside a node its children, half as wide, resolve this part (of the square), where it is smooth.
-constexpr double kResolved = 0.75;
 /// So much of a wave is worth solving all bounces for.
 constexpr std::size_t kLeastPartOfWave = 8;
 /// Sums of so many single numbers are that near.
@@ -48,27 +43,19 @@ constexpr float kRounded = 0.999F;
 /// What a wave of improvement is likely to do to the error.
 class Forecast {
  public:
-  /// Variance of all samples, and squared error by what varies inside shooters, as the gains of a wave count them.
-  Forecast(const ErrorGoal& goal, double variance, double variation)
-      : goal_(goal), variance_(variance), variation_(variation) {}
-  void sample(double less) { sampled_ += less; }
-  void split(double less) { split_ += less; }
+  /// `variance` of all samples, as the gains of a wave count it.
+  Forecast(const ErrorGoal& goal, double variance) : goal_(goal), variance_(variance) {}
+  void sample(double less) { less_ += less; }
   [[nodiscard]] bool isReached() const {
-    const double sampling = goal_.sampling * left(sampled_, variance_);
-    const double residual = goal_.rest + goal_.varying * left(split_, variation_);
-    return std::hypot(residual, sampling) <= kSurelyBelow * goal_.target;
+    const double left = variance_ > 0.0 ? std::sqrt(std::max(0.0, 1.0 - less_ / variance_)) : 1.0;
+    return goal_.sampling * left <= kSurelyBelow * goal_.target;
   }
 
  private:
-  static double left(double less, double all) { return all > 0.0 ? std::sqrt(std::max(0.0, 1.0 - less / all)) : 1.0; }
-
   ErrorGoal goal_;
-  double variance_, variation_;
-  double sampled_ = 0.0, split_ = 0.0;
+  double variance_;
+  double less_ = 0.0;
 };
-
-/// Flux that its own links carry, all channels, mean of the halves.
-double carriedPower(const Shooter& shooter) { return 0.5 * (shooter.own[0] + shooter.own[1]) * shooter.power(); }
 
 }  // namespace
 
@@ -167,7 +154,6 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   const std::array<bool, 2> in{certain || plays(node.place, 0, node.power),
                                certain || plays(node.place, 1, node.power)};
   counters_.roulette_kills += static_cast<std::uint64_t>(!in[0]) + static_cast<std::uint64_t>(!in[1]);
-  if (chance(node.power) < 1.0 / kMaxWeight && !certain) left_out_ += node.net;
   if (!in[0] && !in[1]) return;
   Shooter shooter;
   shooter.place = node.place;
@@ -177,10 +163,7 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   shooter.resolution = resolution_;
   shooter.most_bytes = memory.mostBytes(node.place.side);
   const std::size_t columns = static_cast<std::size_t>(in[0]) + static_cast<std::size_t>(in[1]);
-  if (memory.isFull() || !memory.takeShooters(std::span(&shooter, 1), columns, system)) {
-    left_out_ += node.net;
-    return;
-  }
+  if (memory.isFull() || !memory.takeShooter(shooter, columns, system)) return;
   const auto index = system.add(shooter);
   ++counters_.shooters;
   if (shots_.gathers(node.place)) ++counters_.gathered_nodes;
@@ -220,7 +203,6 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
            std::tie(b.place.side, b.place.level, b.place.y, b.place.x);
   };
   std::priority_queue<Node, std::vector<Node>, decltype(weaker)> queue(weaker);
-  left_out_ = 0.0;
   const auto push = [&](const NodePlace& place, bool beside_edge) {
     Node node = nodeAt(place, unshot);
     node.beside_edge = beside_edge;
@@ -270,93 +252,16 @@ double LinkPlanner::unlinked(const LinkSystem& system) const {
   return flux;
 }
 
-double LinkPlanner::rouletteShare(const LinkSystem& system) {
-  double all = 0.0, roulette = 0.0;
-  for (const auto& shooter : system.shooters()) {
-    const double spread = shooter.spread();
-    all += spread;
-    if (!shooter.isLight() && (shooter.weight[0] != 1.0 || shooter.weight[1] != 1.0)) roulette += spread;
-  }
-  return all > 0.0 ? roulette / all : 0.0;
-}
-
-/// What differs from the mean inside a node reaches a receiver with as much of its links as is near: far away it
-/// cancels, close by it does not. The sum of squared links weighs the near ones most. Per square of a link.
-double LinkPlanner::squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
-                                     const scene::PatchScene& patches) const {
-  if (shooter.isLight() || shooter.place.level == 0) return 0.0;
-  const auto id = nodeId(sides_[shooter.place.side], shooter.place);
-  if (system.hasBelow(shooter.place.side, id)) return 0.0;
-  const double rough = static_cast<double>(unshot.rough(id)) / static_cast<double>(patches.node_area[id]);
-  return kVariation * rough * rough;
-}
-
-double LinkPlanner::variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
-                              const scene::PatchScene& patches) const {
-  return squaredVariation(shooter, system, unshot, patches) * std::max(shooter.products[0], shooter.products[2]);
-}
-
-std::vector<float> LinkPlanner::variationOfLeaves(const LinkSystem& system, const UnshotPyramid& unshot,
-                                                  const scene::PatchScene& patches) const {
-  std::size_t values = 0;
-  for (const auto& side : sides_) values += side.leaf_count;
-  std::vector<float> leaves(values, 0.0F);
-  for (const auto& shooter : system.shooters()) {
-    const double squared = squaredVariation(shooter, system, unshot, patches);
-    if (squared <= 0.0) continue;
-    shooter.column[shooter.products[0] >= shooter.products[2] ? 0 : 1].addSquares(static_cast<float>(squared), leaves);
-  }
-  return leaves;
-}
-
-double LinkPlanner::variation(const LinkSystem& system, const UnshotPyramid& unshot,
-                              const scene::PatchScene& patches) const {
-  double sum = 0.0;
-  for (const auto& shooter : system.shooters()) sum += variation(shooter, system, unshot, patches);
-  return sum;
-}
-
-void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot,
-                        const scene::PatchScene& patches, LinkMemory& memory, std::vector<Measurement>& wanted) {
-  std::vector<Shooter> children;
-  const Side& side = sides_[place.side];
-  const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
-  for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
-    for (std::uint32_t x = 2 * place.x; x < std::min(2 * place.x + 2, grid.width); ++x) {
-      const NodePlace child{place.side, place.level - 1, x, y};
-      const auto id = nodeId(side, child);
-      if (patches.node_area[id] <= 0.0F) continue;
-      Shooter shooter;
-      shooter.place = child;
-      shooter.area = static_cast<double>(patches.node_area[id]);
-      shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
-      shooter.certain = true;
-      shooter.resolution = resolution_;
-      shooter.most_bytes = memory.mostBytes(place.side);
-      children.push_back(shooter);
-    }
-  }
-  if (!memory.takeShooters(children, 2, system)) return;
-  for (const auto& shooter : children) {
-    const auto index = system.add(shooter);
-    ++counters_.shooters;
-    if (shots_.gathers(shooter.place)) ++counters_.gathered_nodes;
-    if (shooter.place.level > 0) ++counters_.whole_subtrees;
-    for (std::size_t half = 0; half < 2; ++half) wantFirst(index, half, system, wanted);
-  }
-}
-
 /// Those that a wave may bring a shooter, in order: about as many points as it has, and no more than a wave brings.
-std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shooter& shooter, Wave wave) const {
+std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shooter& shooter) const {
   const auto taken = shooter.column[0].samples();
-  const auto most_of_wave = wave == Wave::kShort ? kMostOfShortWave : kMostOfWave;
-  const auto most = std::min(most_of_wave, std::max(1U, taken));
+  const auto most = std::min(kMostOfWave, std::max(1U, taken));
   if (shooter.sample_cost > 0.0) return std::vector<FurtherSample>(most, {1, shooter.sample_cost});
   std::vector<FurtherSample> samples;
   for (std::uint32_t k = 0; shooter.isLight() && k < most; ++k)
     samples.push_back({kLightPoints, kLightCost * settings_.lightCost(taken + k) * kLightPoints});
   if (shooter.isLight()) return samples;
-  const auto most_points = std::min(most_of_wave, static_cast<std::uint32_t>(shooter.column[0].points()));
+  const auto most_points = std::min(kMostOfWave, static_cast<std::uint32_t>(shooter.column[0].points()));
   for (std::uint32_t k = 0, all = 0; k == 0 || all < most_points; ++k) {
     const auto points = shots_.pointsOf(shooter.place, taken + k);
     samples.push_back({points, 1.0 + kPointCost * (points - 1)});
@@ -365,12 +270,11 @@ std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shoote
   return samples;
 }
 
-LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system, const UnshotPyramid& unshot,
-                                          const scene::PatchScene& patches, bool may_split, Wave wave) const {
+LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system) const {
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
-    squares += carriedPower(shooter) * carriedPower(shooter);
+    squares += shooter.power() * shooter.power();
   }
   Gains gains;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
@@ -381,7 +285,7 @@ LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system, const Unshot
     }
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: a sample's worth of what is usual for such power is mixed in.
-    const double usual = squares > 0.0 ? spread / squares * carriedPower(shooter) * carriedPower(shooter) : 0.0;
+    const double usual = squares > 0.0 ? spread / squares * shooter.power() * shooter.power() : 0.0;
     const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
     gains.variances += variance;
@@ -390,15 +294,12 @@ LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system, const Unshot
       const double less = variance * taken * (1.0 / before - 1.0 / (before + sample.points));
       return Gain{less / (2.0 * sample.cost), n, sample.points, less};
     };
-    const auto samples = furtherSamples(shooter, wave);
+    const auto samples = furtherSamples(shooter);
     for (const auto& sample : samples) {
       gains.all.push_back(gainOf(sample));
       before += sample.points;
     }
     gains.waits = std::max(gains.waits, gainOf(samples.back()).gain);
-    const double varying = variation(shooter, system, unshot, patches);
-    gains.variations += varying;
-    if (may_split && varying > 0.0) gains.all.push_back({varying / 8.0, n, 0, kResolved * varying});
   }
   std::sort(gains.all.begin(), gains.all.end(), [](const Gain& a, const Gain& b) {
     return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
@@ -406,28 +307,18 @@ LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system, const Unshot
   return gains;
 }
 
-std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches, bool may_split, Wave wave,
-                                              LinkMemory& memory, const ErrorGoal& goal) {
-  const auto gains = findGains(system, unshot, patches, may_split, wave);
-  const std::size_t short_wave = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
-  const std::size_t limit = wave == Wave::kShort ? short_wave : std::numeric_limits<std::size_t>::max();
+std::vector<Measurement> LinkPlanner::improve(const LinkSystem& system, LinkMemory& memory,
+                                              const ErrorGoal& goal) const {
+  const auto gains = findGains(system);
+  const std::size_t usual = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
   std::vector<Measurement> wanted;
   std::vector<std::uint32_t> further(system.shooters().size(), 0);
-  Forecast forecast(goal, gains.variances, gains.variations);
+  Forecast forecast(goal, gains.variances);
   std::size_t planned = 0;  // samples of lights, points of nodes
   for (const auto& gain : gains.all) {
-    if (planned >= limit || gain.gain <= 0.0) break;
-    if (planned >= short_wave / kLeastPartOfWave && forecast.isReached()) break;
-    if (planned >= short_wave && gain.gain < gains.waits) break;  // what waits for the next wave is worth more
-    if (gain.points == 0) {
-      const auto before = wanted.size();
-      if (!memory.isFull())
-        split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, memory, wanted);
-      if (wanted.size() > before) forecast.split(gain.less);
-      planned += wanted.size() - before;
-      continue;
-    }
+    if (gain.gain <= 0.0) break;
+    if (planned >= usual / kLeastPartOfWave && forecast.isReached()) break;
+    if (planned >= usual && gain.gain < gains.waits) break;  // what waits for the next wave is worth more
     const auto& shooter = system.shooters()[gain.shooter];
     // Its columns grow once, whatever the number of samples.
     if (further[gain.shooter] == 0 && (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1))) continue;

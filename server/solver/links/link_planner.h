@@ -27,11 +27,9 @@ struct Measurement {
   std::uint32_t index = 0;  ///< which sample of that column: fixes its points
 };
 
-/// What the stated error is made of, relative, and what it should become.
+/// The relative error that samples cause, and what it should become.
 struct ErrorGoal {
   double sampling = 0.0;  ///< root of the samples' variance
-  double varying = 0.0;   ///< of the residual, what light causes that varies inside shooters
-  double rest = 0.0;      ///< of the residual: what a wave of improvement leaves as it is
   double target = 0.0;
 };
 
@@ -61,7 +59,7 @@ class LinkPlanner {
   void setShare(double share) { share_ = share; }
   [[nodiscard]] double share() const { return share_; }
 
-  /// By side. Nodes of less radiosity, all channels, are no shooters: rays bring their light. Empty: all are.
+  /// By side. Nodes of less radiosity, all channels, are no shooters: rays bring their light. Empty: all may be.
   void setLeastRadiosity(std::vector<double> radiosity) { least_radiosity_ = std::move(radiosity); }
 
   /// After a restore: what is known by side is of so many.
@@ -79,34 +77,15 @@ class LinkPlanner {
   [[nodiscard]] std::vector<Measurement> grow(LinkSystem& system, const UnshotPyramid& unshot,
                                               const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory);
 
-  /// How much a wave of improvement brings at most: little, since the next may choose better where the equation over
-  /// links alone is solved in no time, or as much as there is, where the equation over all rays takes longer.
-  enum class Wave { kShort, kDoubling };
-  /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
-  /// children of nodes inside which light varies (where `may_split`), as far as there is memory, and until the error is
-  /// likely to be what it should.
-  [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                                 const scene::PatchScene& patches, bool may_split, Wave wave,
-                                                 LinkMemory& memory, const ErrorGoal& goal);
-
-  /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
-  /// the shooters causes.
-  [[nodiscard]] double variation(const LinkSystem& system, const UnshotPyramid& unshot,
-                                 const scene::PatchScene& patches) const;
-
-  /// The same for each leaf value. Cost: one look at every link.
-  [[nodiscard]] std::vector<float> variationOfLeaves(const LinkSystem& system, const UnshotPyramid& unshot,
-                                                     const scene::PatchScene& patches) const;
-
-  /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
-  [[nodiscard]] static double rouletteShare(const LinkSystem& system);
+  /// Further samples of shooters whose halves differ, those first that lower the error most for their cost: at most as
+  /// many as there are, as far as there is memory, and until the error is likely to be what it should.
+  [[nodiscard]] std::vector<Measurement> improve(const LinkSystem& system, LinkMemory& memory,
+                                                 const ErrorGoal& goal) const;
 
   /// Russian roulette: weights of weak shooters, so that those which play stand for all. Returns the part of all
   /// power whose weight that changed.
   double weigh(LinkSystem& system);
 
-  /// Flux of the nodes that the last walk found too weak even to play roulette, or had no room for, all channels.
-  [[nodiscard]] double leftOut() const { return left_out_; }
   /// Flux of the shooters whose links are forgotten or not measured yet, all channels.
   [[nodiscard]] double unlinked(const LinkSystem& system) const;
 
@@ -115,7 +94,7 @@ class LinkPlanner {
   /// What its choices depend on, beside the system and the settings.
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
-    archive(self.counters_, self.share_, self.least_radiosity_, self.left_out_);
+    archive(self.counters_, self.share_, self.least_radiosity_);
   }
 
  private:
@@ -133,30 +112,22 @@ class LinkPlanner {
     std::uint32_t points;
     double cost;  ///< in a node's samples from one point
   };
-  [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter, Wave wave) const;
+  [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter) const;
   struct Gain {
     double gain;
-    std::uint32_t shooter, points;  ///< 0 points: split
-    double less;                    ///< of the square of the error
+    std::uint32_t shooter, points;
+    double less;  ///< of the square of the error
   };
   struct Gains {
-    std::vector<Gain> all;    ///< the greatest first
-    double variances = 0.0;   ///< of all samples
-    double variations = 0.0;  ///< square of the error by what varies inside shooters
-    double waits = 0.0;       ///< the greatest of those samples that the wave may not bring
+    std::vector<Gain> all;   ///< the greatest first
+    double variances = 0.0;  ///< of all samples
+    double waits = 0.0;      ///< the greatest of those samples that the wave may not bring
   };
-  [[nodiscard]] Gains findGains(const LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
-                                bool may_split, Wave wave) const;
+  [[nodiscard]] Gains findGains(const LinkSystem& system) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
-  [[nodiscard]] double squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
-                                        const scene::PatchScene& patches) const;
-  [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
-                                 const scene::PatchScene& patches) const;
   void wantFirst(std::uint32_t index, std::size_t half, const LinkSystem& system,
                  std::vector<Measurement>& wanted) const;
-  void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
-             LinkMemory& memory, std::vector<Measurement>& wanted);
   void addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
                   LinkMemory& memory, std::vector<Measurement>& wanted);
 
@@ -169,7 +140,6 @@ class LinkPlanner {
   double share_ = 0.0;
   std::vector<double> least_radiosity_;  // by side
   double roulette_share_ = 0.0;          ///< nodes weaker than this part of a share play
-  double left_out_ = 0.0;
 };
 
 }  // namespace radiosity::solver

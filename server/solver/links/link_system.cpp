@@ -111,7 +111,6 @@ std::uint32_t LinkSystem::add(const Shooter& shooter) {
     const std::uint32_t up = level - place.level;
     const auto above = nodeId(side, {place.side, level, place.x >> up, place.y >> up});
     nodes[above - side.first_node] |= kHasBelow;
-    if (shooters_[index].parent == scene::kNone) shooters_[index].parent = at(place.side, above);
   }
   return index;
 }

@@ -1,20 +1,11 @@
-// The radiosity equation on the shooters chosen so far: each shoots a uniform radiosity over its links, and all bounces
-// between them are solved without another hemicube.
+// Shooters, the links that were measured of them, and the radiosity equation among them: lamps, and nodes so bright
+// that rays would find them too seldom. Each shoots a uniform radiosity over its links, and all bounces between them
+// are solved without another image.
 //
-//   b_m = e_m + mean over node m of rho sum_n T_n w_n s_n,     s_m = b_m - b_parent(m),
+//   b_m = e_m + mean over node m of rho sum_n T_n w_n b_n
 //
-// where T_n are the links of shooter n to leaves, w_n its roulette weight, and parent(m) the nearest shooter above m in
-// its quadtree: a node shoots its mean, its children how they differ from it, signed.
-//
-// Links say what arrives for a radiosity of one, so where all children c of p have links, sum T_c measures what T_p
-// does, from other points. The best mean of both weighs them by their points: a of T_p and 1 - a of the sum, a = k_p /
-// (k_p + k), k = A_p^2 / sum (A_c^2 / k_c), since the variance of T_c falls with its area and its points. Shot as such,
-//
-//   s_p (a T_p + (1 - a) sum T_c) + sum (b_c - b_p) T_c = a s_p T_p + sum (b_c - b_p + (1 - a) s_p) T_c,
-//
-// it is the children that shoot more: s_m = b_m - b_parent + (1 - a_parent) s_parent, over own links a_m s_m. The same
-// holds for their children; k_c counts these, too. No link changes, halves stay apart, weights do not depend on what
-// was measured, so all stays unbiased. Who plays roulette leaves everything to its children (a = 0).
+// where T_n are the links of shooter n to leaves, and w_n its roulette weight. What leaves have beside, LeafGather
+// brings.
 //
 // Solved by GMRES around sweeps of Gauss and Seidel, which are progressive shooting on few unknowns (Cohen and others
 // 1988). Two independent halves of all links give two independent solutions, whose difference is the sampling error.
@@ -39,15 +30,13 @@ struct Shooter {
   std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
   std::uint32_t source = scene::kNone;     ///< index of the light without extent, or kNone; `area` is its flux for one
   std::uint32_t crowd = scene::kNone;      ///< index of the crowd of lamps, or kNone; `area` is its flux for one
-  std::uint32_t parent = scene::kNone;     ///< nearest shooter above
   bool certain = false;                    ///< never plays roulette
   std::uint32_t resolution = 0;            ///< N of a node's item buffers
   double area = 0.0;                       ///< that shines, unit box squared
   std::array<LinkColumn, 2> column;        ///< by half
   std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half
-  std::array<double, 2> own{1.0, 1.0};     ///< part of s that its own links carry, the rest goes to its children
   std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
-  std::array<glm::vec3, 2> sent{};         ///< s, before the weight
+  std::array<glm::vec3, 2> sent{};         ///< the same as it is shot, before the weight
 
   std::size_t most_bytes = 0;        ///< that a column can come to take
   double sample_cost = 0.0;          ///< of a source or crowd, in a node's samples from one point
@@ -61,7 +50,7 @@ struct Shooter {
     return isLight() && power() > 0.0 && (column[0].points() == 0.0 || column[1].points() == 0.0);
   }
   /// Radiosity that its own links carry.
-  [[nodiscard]] double carried(std::size_t half) const { return weight[half] * own[half]; }
+  [[nodiscard]] double carried(std::size_t half) const { return weight[half]; }
   /// Flux it shoots, all channels, mean of the halves and before roulette.
   [[nodiscard]] double power() const;
   /// Variance that it brings to irradiance: area-weighted square of the difference between what its halves deliver.
@@ -79,7 +68,7 @@ class LinkSystem {
   /// Unit box squared, by leaf value.
   [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
 
-  /// Index of the new shooter. Ancestors must come before their descendants.
+  /// Index of the new shooter. No node above or below it may be one.
   std::uint32_t add(const Shooter& shooter);
   [[nodiscard]] std::vector<Shooter>& shooters() { return shooters_; }
   [[nodiscard]] const std::vector<Shooter>& shooters() const { return shooters_; }
@@ -174,7 +163,6 @@ class LinkSystem {
   [[nodiscard]] bool hasSameReflectance(std::uint32_t member, const LinkSystem& former, std::uint32_t old_member) const;
   void updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
-  void shareAmongChildren(std::size_t half);
   void beginHalf(std::size_t half);
   void advanceHalf(std::size_t half);
   void sweep(std::size_t half, Gmres<double>::Vectors& sent, bool affine);

@@ -47,23 +47,11 @@ void LinkedSolver::assess() {
       presumed += 0.5 * shooter.power() * column.totals().presumed / shooter.area;
     }
   }
-  // What a wave that ended early did not measure stands for its leaves, so that it is not unshot, and sends nothing.
-  // Parts of a node are signed: what of them would have taken light away is no light that is missing.
-  const double of_lights = owed, unlinked = std::max(0.0, planner_.unlinked(system_));
-  const double left_out = planner_.leftOut() + (growing_ ? 0.0 : unlinked);
-  if (by_rays_) {
-    const auto sky = skyFlux();
-    if (!gathers()) owed += net_unshot_ + varying_ + sky[0] + sky[1] + sky[2];  // rays will bring it
-  } else {
-    owed += growing_ ? net_unshot_ + unlinked : left_out;
-  }
+  // Rays will bring what no shooter stands for, and what a wave that ended early did not measure.
+  const auto sky = skyFlux();
+  if (!gathers()) owed += net_unshot_ + varying_ + planner_.unlinked(system_) + sky[0] + sky[1] + sky[2];
   if (field.square() <= 0.0) {
-    // What convex lamps send leaves the scene, however it varies within nodes that were seen to light nothing. Of those
-    // that are left out, being weak beside such lamps or for want of memory, nobody knows.
-    const bool is_open = growing_ || (by_rays_ && !gathers());
-    const double unseen = is_open ? owed + varying_ : of_lights + (by_rays_ ? unlinked : left_out);
-    const bool lacks = unseen > 0.0 || (gathers() && gather_->bias() > 0.0);
-    left_out_ = !is_open && !by_rays_ && left_out > 0.0 ? 1.0 : 0.0;
+    const bool lacks = owed > 0.0 || (gathers() && gather_->bias() > 0.0);
     error_.residual = error_.total = lacks ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }
@@ -74,14 +62,11 @@ void LinkedSolver::assess() {
   const double doubt = gathers() ? gather_->doubt() : 0.0;
   error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));
   error_.discretization = field.discretization();
-  const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   double unsolved = gathers() ? gather_->unsolved() : 0.0;
   if (gathers())
     unsolved = std::clamp(std::sqrt(gather_->unsolvedSquare() / field.square()), kLeastUnsolved * unsolved, unsolved);
-  error_.residual = (owed + presumed) / (1.0 - kept) / received + varying + system_.unsolved() + unsolved;
+  error_.residual = (owed + presumed) / (1.0 - kept) / received + system_.unsolved() + unsolved;
   error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
-  varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
-  left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
   if (!variation_) return;
   error_.sampling = std::hypot(by_links_, std::sqrt((variation_->noise() + doubt) / field.square()));
@@ -175,7 +160,7 @@ double LinkedSolver::lostPart() const {
 double LinkedSolver::powerToShoot() const {
   double shot = 0.0, received = 0.0, reflected = 0.0;
   for (const auto& shooter : system_.shooters()) {
-    if (!shooter.isLight() && shooter.parent == scene::kNone) shot += shooter.power();
+    if (!shooter.isLight()) shot += shooter.power();
   }
   if (gathers()) return shot + net_unshot_;
   for (const auto& side : sides_) {
@@ -215,8 +200,8 @@ EnergyParts LinkedSolver::energy() const {
     // Shooters that won at roulette sent more than their own leaves have, those that lost nothing.
     for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
       for (int c = 0; c < 3; ++c)
-        sent_for[static_cast<std::size_t>(c)] += 0.5 * (shooter.weight[half] - 1.0) * shooter.own[half] *
-                                                 static_cast<double>(shooter.sent[half][c]) * shooter.area;
+        sent_for[static_cast<std::size_t>(c)] +=
+            0.5 * (shooter.weight[half] - 1.0) * static_cast<double>(shooter.sent[half][c]) * shooter.area;
     }
   }
   for (const auto& side : sides_) {

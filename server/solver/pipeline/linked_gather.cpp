@@ -48,11 +48,6 @@ constexpr int kParts = 32;
 
 }  // namespace
 
-bool LinkedSolver::raysPay() const { return mayGather(system_.leafAreas().size(), settings_); }
-
-/// Rays may take half of the memory, so links get the other.
-void LinkedSolver::limitLinks() { memory_.limit(by_rays_ ? settings_.link_memory / 2 : settings_.link_memory); }
-
 double LinkedSolver::shotCost() const {
   return kShotLeaf * static_cast<double>(system_.leafAreas().size()) +
          kShotTriangle * std::sqrt(static_cast<double>(patches_->triangles.size()));
@@ -62,9 +57,10 @@ double LinkedSolver::rayCost() const {
   return kRayLevel * std::log2(2.0 + static_cast<double>(patches_->triangles.size()));
 }
 
-bool LinkedSolver::mayGather(std::size_t leaves, const SolverSettings& settings) {
-  return settings.reflected != SolverSettings::Reflected::kByLinks &&
-         LeafGather::leastBytes(leaves) <= settings.link_memory / 2;
+bool LinkedSolver::mayGather(const scene::PatchScene& patches, const SolverSettings& settings) {
+  std::size_t leaves = 0;
+  for (const auto& side : makeSides(patches)) leaves += side.leaf_count;
+  return LeafGather::leastBytes(leaves) <= settings.link_memory / 2;
 }
 
 /// Half of the light that is reflected comes from what is no brighter than this, about; all channels. In a building

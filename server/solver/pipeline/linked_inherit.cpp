@@ -55,9 +55,6 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   solutions_ = former.solutions_;
   sweeps_ = former.sweeps_;
   replayed_ = former.replayed_;
-  share_part_ = former.share_part_;
-  by_rays_ = former.by_rays_ && mayGather(system_.leafAreas().size(), settings_);
-  limitLinks();
   aim_ = std::max(former.aim_, settings_.target_error);
   planner_.setTarget(aim_);
   planner_.inherit(former.planner_, numbers.side_after);
@@ -69,7 +66,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   setPostponed(former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error);
   planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), *reach);
   if (former.variation_) inheritVariation(former, numbers);
-  if (by_rays_ && former.gather_) inheritRays(former, numbers);
+  if (former.gather_) inheritRays(former, numbers);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();

@@ -7,13 +7,6 @@
 #include "server/solver/pipeline/linked_solver.h"
 
 namespace radiosity::solver {
-namespace {
-
-/// Of what light that varies inside shooters causes, the part that falls where their links say; the rest goes on to
-/// bounce and ends up everywhere. Calibrated on the Cornell box against the path tracer.
-constexpr double kStaysNear = 0.5;
-
-}  // namespace
 
 /// All light there is, with what leaves lack.
 std::vector<glm::vec3> LinkedSolver::irradiance() const {
@@ -75,27 +68,6 @@ std::vector<std::uint8_t> LinkedSolver::shotLevels() const {
       if (patches_->node_area[side.first_node + leaf] > 0.0F) levels[side.first_node + leaf] = 0;
   }
   return levels;
-}
-
-std::vector<float> LinkedSolver::residualShape() const {
-  const auto varying = planner_.variationOfLeaves(system_, unshot_, *patches_);
-  double sum = 0.0, area = 0.0;
-  for (const auto& side : sides_) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-      sum += a * static_cast<double>(varying[side.first_value + leaf]);
-      area += a;
-    }
-  }
-  if (sum <= 0.0) return {};
-  std::vector<float> shape(patches_->nodeCount(), 0.0F);
-  const double near = kStaysNear * varying_share_;
-  const auto scale = static_cast<float>(near * area / sum), even = static_cast<float>(1.0 - near);
-  for (const auto& side : sides_) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      shape[side.first_node + leaf] = even + scale * varying[side.first_value + leaf];
-  }
-  return shape;
 }
 
 /// What smoothing took of the light of lamps and of that of rays, by leaf value; empty: there are no rays.

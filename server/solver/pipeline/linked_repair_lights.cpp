@@ -79,7 +79,7 @@ std::vector<float> LinkedSolver::noiseOfLeaves(std::uint32_t light,
 }
 
 /// Surfaces that one can see through hide nothing for sure.
-bool LinkedSolver::mayLookFromLeaves() const { return by_rays_ && patches_->opacity.empty(); }
+bool LinkedSolver::mayLookFromLeaves() const { return patches_->opacity.empty(); }
 
 /// Of a light of which some points have looked, both halves: how unsure that leaves it. Most of that is a few leaves,
 /// at the edges of shadows (behind a table, at 8 points, 74 of 436 hold 85 % of it). These look for

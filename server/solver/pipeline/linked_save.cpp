@@ -9,13 +9,13 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x424b4e4cU;  // "LNKB": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x434b4e4cU;  // "LNKC": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
 void visitShooter(Archive& archive, Self& shooter) {
   archive(shooter.place, shooter.light, shooter.source, shooter.crowd, shooter.sample_cost, shooter.certain,
-          shooter.resolution, shooter.area, shooter.weight, shooter.own, shooter.mean, shooter.sent, shooter.most_bytes,
+          shooter.resolution, shooter.area, shooter.weight, shooter.mean, shooter.sent, shooter.most_bytes,
           shooter.products);
 }
 
@@ -84,10 +84,9 @@ bool LinkSystem::restore(ArchiveReader& from) {
 template <typename Archive, typename Self>
 void LinkedSolver::visit(Archive& archive, Self& self) {
   archive(self.lights_, self.sources_, self.sky_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
-          self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
-          self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
-          self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_,
-          self.sampled_alone_, self.shaded_, self.in_haste_, self.rough_);
+          self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.rounds_,
+          self.solutions_, self.sweeps_, self.replayed_, self.half_, self.refined_, self.by_links_, self.error_,
+          self.counters_, self.sample_goal_, self.aim_, self.sampled_alone_, self.shaded_, self.in_haste_, self.rough_);
   DirectSmoothing::visit(archive, self.direct_smoothing_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
@@ -150,7 +149,6 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
   planner_.setTarget(aim_);
   rounds_before_edit_ = rounds_;
-  limitLinks();
   const auto& shooters = system_.shooters();
   const auto known = [&](const Shooter& shooter) {
     return (shooter.light == scene::kNone || shooter.light < lights_.size()) &&

@@ -155,7 +155,6 @@ void LinkedSolver::dropNodes() {
   repairs_ = std::move(repairs);
   repaired_ = 0;
   due_ = repairs_.size();
-  share_part_ = 1.0 / settings_.planner.first_shooters;
 }
 
 /// What follows is to assess what there is. False: the light is to be solved for again, since there was no room for the
@@ -251,9 +250,10 @@ bool LinkedSolver::settleFromLinks() {
     // It showed how strong the shooters are, for their roulette.
     double power = 0.0;
     for (const auto& shooter : system_.shooters()) {
-      if (!shooter.isLight() && shooter.parent == scene::kNone) power += shooter.power();
+      if (!shooter.isLight()) power += shooter.power();
     }
-    if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
+    if (power > 0.0)
+      planner_.setShare(power / settings_.planner.first_shooters);  // weak beside the light that there is now
     (void)planner_.weigh(system_);
     system_.begin();  // from the first solution, which depends on nothing else either
     pass_ = Pass::kSecond;

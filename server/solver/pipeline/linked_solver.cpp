@@ -16,15 +16,6 @@
 namespace radiosity::solver {
 namespace {
 
-/// A refinement divides the share of power of a shooter by this.
-constexpr double kRefinement = 2.0;
-/// More refinements than this find nothing: everything is split to its leaves.
-constexpr double kMinShare = 1e-9;
-/// Shares are refined when what roulette and weakness cause is this part of the error: a wave of growth lowers it by
-/// more than a wave of samples, long before it is the larger part.
-constexpr double kByShare = 0.35;
-/// Where nothing can be split any more, samples stop when their error is this part of the rest.
-constexpr double kIdleSampling = 0.1;
 /// Before the first was timed: as many measurements, of some images each, as draw so many triangles.
 constexpr std::size_t kFirstTriangles = 1'600'000;
 constexpr std::size_t kFewestMeasurements = 8;
@@ -55,7 +46,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       shots_(*patches_, sides_, settings.seed),
       system_(*patches_, sides_),
       expander_(*patches_, sides_),
-      memory_(*patches_, sides_, settings.link_memory),
+      memory_(*patches_, sides_, settings.link_memory / 2),  // rays may take the other half
       unshot_(*patches_),
       planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
       ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
@@ -71,10 +62,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   key_end_ = static_cast<std::uint32_t>(patches_->nodeCount());
   triangle_key_end_ = static_cast<std::uint32_t>(patches_->triangles.size());
   takeMaterials(materials);
-  by_rays_ = raysPay();
   takeSources(sources);
-  share_part_ = 1.0 / settings_.planner.first_shooters;
-  limitLinks();
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -161,29 +149,20 @@ void LinkedSolver::startGrowth() {
   std::vector<double> least;
   const auto find = [&](std::size_t part) {
     if (part == 0) power = powerToShoot();
-    if (part == 1 && by_rays_) least = leastRadiosity();
+    if (part == 1) least = leastRadiosity();
   };
   doShares(2, ShareOfWork(find));
-  planner_.setShare(power * share_part_);
+  planner_.setShare(power / settings_.planner.first_shooters);
   planner_.setLeastRadiosity(std::move(least));
   phase_ = Phase::kGrow;
 }
 
-/// No memory for more shooters, or nothing left to split.
-bool LinkedSolver::isFull() const { return memory_.isFull() || share_part_ < kMinShare; }
-
 std::vector<Measurement> LinkedSolver::plan() {
   memory_.begin(system_);
   if (phase_ == Phase::kLights) return planLights();
-  if (phase_ == Phase::kImprove && gather_) {
-    if (sample_goal_ <= 0.0) return {};
-    return planner_.improve(system_, unshot_, *patches_, false, LinkPlanner::Wave::kDoubling, memory_,
-                            {std::sqrt(noise().links), 0.0, 0.0, sample_goal_});
-  }
   if (phase_ == Phase::kImprove) {
-    const double varying = varying_share_ * error_.residual;
-    const ErrorGoal goal{by_links_, varying, error_.residual - varying, targetOfLinks()};
-    return planner_.improve(system_, unshot_, *patches_, !isFull(), LinkPlanner::Wave::kShort, memory_, goal);
+    if (sample_goal_ <= 0.0) return {};
+    return planner_.improve(system_, memory_, {std::sqrt(noise().links), sample_goal_});
   }
   if (planner_.share() <= 0.0) return {};
   // Also where there is no room: the walk finds out how much light goes without.
@@ -245,7 +224,7 @@ Result<StepOutcome> LinkedSolver::advance() {
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
     if (wanted_.empty() && phase_ == Phase::kImprove &&
-        !(gather_ && gather_->isBehind()))  // no sample that there is room for can lower the error
+        !gather_->isBehind())  // no sample that there is room for can lower the error
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
@@ -255,7 +234,7 @@ Result<StepOutcome> LinkedSolver::advance() {
   }
   settling_ = true;  // also where memory runs out
   // Over the few links that there are beside rays nothing is gained by going on from the light before.
-  const bool from_nothing = gather_ && phase_ == Phase::kImprove;
+  const bool from_nothing = phase_ == Phase::kImprove;
   settling_ = !(from_nothing ? settleFromLinks() : settle());
   if (settling_) return StepOutcome::kSlice;
   is_confirmed_ = from_nothing;
@@ -364,29 +343,10 @@ StepOutcome LinkedSolver::chooseFurther() {
     return StepOutcome::kRoundDone;
   }
   if (refineVariation()) return StepOutcome::kRoundDone;
-  if (by_rays_) {
-    refined_ = true;  // should memory run out, it is chosen anew
-    const auto next = chooseRays();
-    refined_ = false;
-    return next;
-  }
-  // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
-  const double total = std::hypot(by_links_, error_.residual);
-  if (total <= targetOfLinks()) return exhausted(SolveLimit::kWithin);
-  const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
-  const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
-  const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));
-  if (!hasRounds()) return exhausted(SolveLimit::kRounds);
-  if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
-    return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
-  if (by_share) {
-    share_part_ /= kRefinement;
-    planner_.setShare(planner_.share() / kRefinement);
-    phase_ = Phase::kGrow;
-  } else {
-    phase_ = Phase::kImprove;
-  }
-  return StepOutcome::kRoundDone;
+  refined_ = true;  // should memory run out, it is chosen anew
+  const auto next = chooseRays();
+  refined_ = false;
+  return next;
 }
 
 void LinkedSolver::setTargetError(double target) {

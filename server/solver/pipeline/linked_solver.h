@@ -1,10 +1,10 @@
-// Progressive radiosity that remembers its links: a hemicube is rendered once for each sample of a shooter, and every
-// bounce, edit of light or colour and repeated shot runs over the links it left.
+// Radiosity that remembers what it measured: the links of lamps, and of nodes so bright that rays would find them too
+// seldom, and the rays that gather all other light. Every edit of light or colour runs over the links and rays there
+// are.
 //
-// Lights: direct light, from many points. Grow: the strongest unshot nodes become shooters, wave by wave, until what is
-// left is stood for by others. Improve, until the stated error is reached: whatever lowers it most for its cost, be it
-// further samples of a shooter whose two halves differ, or shooters for the children of a node inside which light
-// varies.
+// Lights: direct light, from many points. Grow: nodes that are bright become shooters. Improve, until the stated error
+// is reached: more rays, or further samples of a shooter whose two halves differ, whichever lowers it most for its
+// cost.
 #pragma once
 
 #include <cmath>
@@ -68,7 +68,6 @@ class LinkedSolver final : public Solver {
   }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
-  [[nodiscard]] std::vector<float> residualShape() const override;
   [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
@@ -83,15 +82,15 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
 
-  /// Whether rays could bring reflected light to so many leaf values, as far as settings and memory go.
-  [[nodiscard]] static bool mayGather(std::size_t leaves, const SolverSettings& settings);
+  /// Whether there is memory for the rays of a scene.
+  [[nodiscard]] static bool mayGather(const scene::PatchScene& patches, const SolverSettings& settings);
   /// After an edit of geometry: no light before all links are true.
   void beExact();
   /// What the links of all lights can come to take.
   [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
   [[nodiscard]] const LinkSystem& system() const { return system_; }
-  /// The rays that reflected light comes by; null: it comes over links, or is not there yet.
+  /// The rays that reflected light comes by; null: it is not there yet.
   [[nodiscard]] const LeafGather* gathered() const { return gather_.get(); }
 
  private:
@@ -210,7 +209,6 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] Result<void> repairSlice();
   void takeRepairs(RepairBatch& batch);
   void addShots(RepairBatch& batch);
-  [[nodiscard]] bool isFull() const;
   /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
   [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
   [[nodiscard]] std::vector<Measurement> plan();
@@ -302,8 +300,6 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool aimFurther();
   /// Rays have brought light, and nothing is left to shoot.
   [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
-  [[nodiscard]] bool raysPay() const;
-  void limitLinks();
   [[nodiscard]] double shotCost() const;
   [[nodiscard]] double rayCost() const;
   [[nodiscard]] double samplesCost() const;
@@ -356,8 +352,7 @@ class LinkedSolver final : public Solver {
   UnshotPyramid unshot_;
   LinkPlanner planner_;
   std::shared_ptr<const LeafRays> leaf_rays_;  // of rays and paths; null: not asked for yet
-  bool by_rays_ = false;                       // reflected light, but for what is bright and small
-  std::unique_ptr<LeafGather> gather_;         // then: once lights, and that, are measured
+  std::unique_ptr<LeafGather> gather_;         // of reflected light; null: lights, and what is bright, are not measured
   double sampled_alone_ = 0.0;        // error before the last round that brought samples and no rays; 0: none did
   double sample_goal_ = 0.0;          // sampling error that further samples of links shall reach; 0: none
   std::vector<Repair> repairs_;       // after an edit of geometry
@@ -390,13 +385,10 @@ class LinkedSolver final : public Solver {
   std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
   bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
   double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
-  double share_part_ = 0.0;           // of all power, that one shooter should have
-  double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
   bool all_unshot_ = false;                     // an AllUnshot lives
-  double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   LeafShading shading_;
   ShadedLight shaded_;          // to be added to half_ where it is told

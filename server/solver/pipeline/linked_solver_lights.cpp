@@ -121,7 +121,7 @@ void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
   sky_.clear();
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
-    if (by_rays_ && source.kind == PunctualLights::Source::Kind::kSky) {
+    if (source.kind == PunctualLights::Source::Kind::kSky) {
       sky_.push_back(source);
       continue;
     }
@@ -239,16 +239,13 @@ std::vector<Measurement> LinkedSolver::planLights() {
   return wanted;
 }
 
-/// Those that only correct a shooter above them go first: it still stands for them. False: none has links.
+/// Rays bring its light from then on. False: none has links.
 bool LinkedSolver::forgetWeakest() {
   std::uint32_t weakest = scene::kNone;
   const auto& shooters = system_.shooters();
-  const auto worth = [&](std::uint32_t n) {
-    return std::pair(shooters[n].parent == scene::kNone, shooters[n].power());
-  };
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].isLight() || shooters[n].column[0].bytes() + shooters[n].column[1].bytes() == 0) continue;
-    if (weakest == scene::kNone || worth(n) < worth(weakest)) weakest = n;
+    if (weakest == scene::kNone || shooters[n].power() < shooters[weakest].power()) weakest = n;
   }
   if (weakest == scene::kNone) return false;
   memory_.giveBack(shooters[weakest].column[0].bytes() + shooters[weakest].column[1].bytes());

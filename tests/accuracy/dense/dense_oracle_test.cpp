@@ -56,13 +56,9 @@ struct Outcome {
   std::vector<oracle::Corners> occluders;
 };
 
-enum class Way { kByRays, kOverLinks, kOfThePaper };
-
-Outcome solveBoth(const Case& c, Way way) {
+Outcome solveBoth(const Case& c, Method method) {
   Outcome outcome;
-  outcome.solve = solveReally(
-      c.scene,
-      {.target_error = c.target_error, .paper_mode = way == Way::kOfThePaper, .over_links = way == Way::kOverLinks});
+  outcome.solve = solveReally(c.scene, {.target_error = c.target_error, .method = method});
   if (c.occluded) outcome.occluders = oracle::allPolygons(c.scene);
   const auto patches = outcome.solve.patches();
   // Adaptive subdivision would never end at the edges of shadows: there a fixed rule.
@@ -82,26 +78,41 @@ constexpr double kCalibration = 1.5;
 
 class DenseOracle : public testing::TestWithParam<Case> {};
 
-void expectTheIrradianceOfEveryTexel(const Case& c, Way way) {
-  const auto [solve, dense, difference, occluders] = solveBoth(c, way);
-  // A round looks at one point of each texel, for both of the halves whose difference is the stated sampling error:
-  // what that costs is not stated.
-  const double points = spreadInsideTexels(solve, dense, occluders) / std::sqrt(solve.rounds);
-  EXPECT_LT(difference.rms, std::hypot(kCalibration * solve.stated.total, points));
-  // Points average out over a surface's texels.
-  EXPECT_LT(difference.surface, 0.01);
+void expectTheIrradianceOfEveryTexel(const Case& c, Method method, std::uint64_t seeds = 1) {
+  const auto first = solveBoth(c, method);
+  const double inside = spreadInsideTexels(first.solve, first.dense, first.occluders);
+  double bias = 0.0, stated = 0.0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const SolveOptions options{.target_error = c.target_error, .method = method, .seed = seed};
+    const auto solve = seed == 1 ? first.solve : solveReally(c.scene, options);
+    const auto difference = compare(solve, first.dense.irradiance_lux);
+    // A round looks at one point of each texel, for both of the halves whose difference is the stated sampling error:
+    // what that costs is not stated.
+    const double points = inside / std::sqrt(solve.rounds);
+    EXPECT_LT(difference.rms, std::hypot(kCalibration * solve.stated.total, points));
+    // Points average out over a surface's texels.
+    EXPECT_LT(difference.surface, 0.01);
+    bias += difference.bias;
+    stated += solve.stated.total;
+    testing::Test::RecordProperty("bias_" + std::to_string(seed), std::to_string(difference.bias));
+    testing::Test::RecordProperty("stated_" + std::to_string(seed), std::to_string(solve.stated.total));
+  }
   // Nothing is lost: the sum over all texels is far better than one of them.
-  EXPECT_LT(std::abs(difference.bias), 0.5 * solve.stated.total);
+  EXPECT_LT(std::abs(bias), 0.5 * stated);
 }
 
-TEST_P(DenseOracle, RaysBringTheIrradianceOfEveryTexel) { expectTheIrradianceOfEveryTexel(GetParam(), Way::kByRays); }
+TEST_P(DenseOracle, RaysBringTheIrradianceOfEveryTexel) {
+  expectTheIrradianceOfEveryTexel(GetParam(), Method::kGather);
+}
 
-TEST_P(DenseOracle, LinksBringTheIrradianceOfEveryTexel) {
-  expectTheIrradianceOfEveryTexel(GetParam(), Way::kOverLinks);
+// A shot is from one point, whose light is off alike at all texels that it reaches, so that only seeds average: between
+// perpendicular plates each of four is off by 0.17 to 0.74 of the stated error in all, their mean by 0.11.
+TEST_P(DenseOracle, AveragedShootingBringsTheIrradianceOfEveryTexel) {
+  expectTheIrradianceOfEveryTexel(GetParam(), Method::kShooting, 4);
 }
 
 TEST_P(DenseOracle, ThePaperModeHasTheLightOfEverySurfaceAndBlursItInside) {
-  const auto [solve, dense, difference, occluders] = solveBoth(GetParam(), Way::kOfThePaper);
+  const auto [solve, dense, difference, occluders] = solveBoth(GetParam(), Method::kPaper);
   // Some hundred hemicubes of 32 to 256 pixels, each from one place of its shooter: a surface's light is the mean of
   // few of them, of which the method itself states nothing. 4, 8 and 12 % of the worst surface in three scenes.
   constexpr double kChance = 0.15;
@@ -133,9 +144,9 @@ class LumpedUnitCube : public testing::TestWithParam<LumpedCube> {
     const auto normal = oracle::unitNormal(face.patch.corners);
     return GetParam().radiosity_lux[normal.y > 0.5 ? 0 : normal.y < -0.5 ? 1 : 2];
   }
-  [[nodiscard]] static RealSolve solve(bool paper_mode, std::uint64_t seed = 1) {
+  [[nodiscard]] static RealSolve solve(Method method, std::uint64_t seed = 1) {
     const auto cube = test_scenes::lumpedCube(GetParam().reflectance);
-    return solveReally(cube, {.texel_size_m = 1.0, .target_error = 0.004, .paper_mode = paper_mode, .seed = seed});
+    return solveReally(cube, {.texel_size_m = 1.0, .target_error = 0.004, .method = method, .seed = seed});
   }
   [[nodiscard]] static double found(const SolvedTexel& face) {
     return face.patch.emission_lux.x + face.patch.reflectance.x * face.irradiance_lux.x;
@@ -143,7 +154,7 @@ class LumpedUnitCube : public testing::TestWithParam<LumpedCube> {
 };
 
 TEST_P(LumpedUnitCube, HasTheExactRadiosityOfEveryFace) {
-  const auto cube = solve(false);
+  const auto cube = solve(Method::kGather);
   ASSERT_EQ(cube.texels.size(), 6U);
   double all = 0.0, exact_all = 0.0;
   for (const auto& face : cube.texels) {
@@ -164,7 +175,7 @@ TEST_P(LumpedUnitCube, IsRightInTheMeanInPaperMode) {
   constexpr std::uint64_t kSeeds = 48;
   double sum = 0.0, count = 0.0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const auto cube = solve(true, seed);
+    const auto cube = solve(Method::kPaper, seed);
     ASSERT_EQ(cube.texels.size(), 6U);
     for (const auto& face : cube.texels) {
       if (face.patch.emission_lux.x > 0.0) continue;

@@ -81,9 +81,7 @@ RealSolve solveReally(const test_scenes::TestScene& scene, const SolveOptions& o
   solver::SolverSettings settings;
   settings.target_error = options.target_error;
   settings.seed = options.seed;
-  settings.method = options.paper_mode ? Method::kPaper : Method::kGather;
-  using Reflected = solver::SolverSettings::Reflected;
-  settings.reflected = options.over_links ? Reflected::kByLinks : Reflected::kByRays;
+  settings.method = options.method;
   settings.within_leaves = false;  // the dense solution is one of lumped patches
   const auto solver = solver::makeSolver(patches, materials, *transport, settings);
   auto outcome = solver::StepOutcome::kSlice;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "common/method.h"
 #include "server/solver/solver.h"
 #include "tests/oracle/dense_solver.h"
 #include "tests/scenes/scene.h"
@@ -17,7 +18,7 @@ namespace radiosity::accuracy {
 struct SolveOptions {
   double texel_size_m = 0.125;
   double target_error = 0.01;
-  bool paper_mode = false, over_links = false;
+  Method method = Method::kGather;
   std::uint64_t seed = 1;
 };
 

@@ -344,22 +344,47 @@ TEST_F(Edits, BackToAPlaceInAnotherLightIsSolvedOverTheLinksThatWereThere) {
   EXPECT_TRUE(light() == before) << "the same bits";
 }
 
-/// What is kept of the scene before an edit never makes links take more than they may.
+/// What is kept of the scene before an edit never makes links and rays take more than they may.
 TEST_F(Edits, ASceneWhoseLinksFillTheirMemoryIsSolvedAgainOnItsWayBack) {
-  solve(lumpedCube(0.5));
-  constexpr std::uint64_t kTight = 244'000;  // too little for rays, enough for links
+  auto scene = lumpedCube(0.5);
+  for (int i = 0; i < 400; ++i)  // each has links to all texels
+    scene.lights.push_back({.position = {0.1 + 0.002 * i, 0.5, 0.5}, .intensity = glm::dvec3(1e-3)});
+  solve(scene);
+  constexpr std::uint64_t kTight = 800'000;  // of which lamps take a third, and rays as much as there is
   for (const bool fits : {false, true}) {
-    ASSERT_TRUE(configure([&](auto& settings) { settings.link_memory_bytes = fits ? 8 * kTight : kTight; }));
-    ASSERT_TRUE(reaches(SolveState::kConverged));
-    ASSERT_EQ(status().counters["rays"] > 0.0, fits);
+    ASSERT_TRUE(configure([&](auto& settings) {
+      settings.link_memory_bytes = fits ? 8 * kTight : kTight;
+      settings.target_error = fits ? kEasy : kNever;
+    }));
+    ASSERT_TRUE(reaches(fits ? SolveState::kConverged : SolveState::kLimited));
+    ASSERT_GT(status().counters["rays"], 0.0);
     ASSERT_EQ(2 * static_cast<std::uint64_t>(status().counters["links.bytes"]) <= status().settings.link_memory_bytes,
-              fits);
+              fits)
+        << status().counters["links.bytes"];
     const auto returned = status().counters["skip.solvesReturned"];
     ASSERT_TRUE(patch(kMove));
     ASSERT_TRUE(reaches(SolveState::kConverged) || reaches(SolveState::kLimited));
     ASSERT_TRUE(undo());
     (void)sceneText();
     EXPECT_EQ(status().counters["skip.solvesReturned"] > returned, fits);
+  }
+}
+
+TEST_F(Edits, ASceneThatIsShotForWantOfMemoryRemembersNothingButItsLight) {
+  solve(lumpedCube(0.5));
+  constexpr std::uint64_t kTight = 244'000;  // too little for rays
+  for (const bool fits : {false, true}) {
+    ASSERT_TRUE(configure([&](auto& settings) { settings.link_memory_bytes = fits ? 8 * kTight : kTight; }));
+    ASSERT_TRUE(reaches(SolveState::kConverged));
+    ASSERT_EQ(status().counters["rays"] > 0.0, fits);
+    ASSERT_EQ(status().counters["links.bytes"] > 0.0, fits);
+    ASSERT_LE(2 * static_cast<std::uint64_t>(status().counters["links.bytes"]), status().settings.link_memory_bytes);
+    const auto returned = status().counters["skip.solvesReturned"];
+    ASSERT_TRUE(patch(kMove));
+    ASSERT_TRUE(reaches(SolveState::kConverged) || reaches(SolveState::kLimited));
+    ASSERT_TRUE(undo());
+    (void)sceneText();
+    EXPECT_GT(status().counters["skip.solvesReturned"], returned);
   }
 }
 

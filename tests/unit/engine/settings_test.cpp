@@ -78,7 +78,7 @@ TEST_F(Settings, TheTimeLimitEndsAlsoASolveOfWhichNoMeasurementComesToAnEnd) {
 
 TEST_F(Settings, MemoryForLinksThatIsUsedUpEndsTheSolveAboveItsTargetAndAnEditGoesOn) {
   ASSERT_TRUE(configure([](SolveSettings& settings) {
-    settings.link_memory_bytes = 200'000;
+    settings.link_memory_bytes = 400'000;
     settings.target_error = kNever;
   }));
   ASSERT_TRUE(load(lumpedCube(0.5)));
@@ -86,7 +86,7 @@ TEST_F(Settings, MemoryForLinksThatIsUsedUpEndsTheSolveAboveItsTargetAndAnEditGo
   const auto stopped = status();
   EXPECT_NE(stopped.failure.find("--link-memory"), std::string::npos) << stopped.failure;
   EXPECT_GT(stopped.error.texels, kNever);
-  EXPECT_LE(stopped.counters.at("links.bytes"), 200'000.0);
+  EXPECT_LE(stopped.counters.at("links.bytes"), 400'000.0);
   ASSERT_TRUE(engine().lightmaps());
   ASSERT_TRUE(configure([](SolveSettings& s) { s.target_error = kEasy; }));
   EXPECT_TRUE(reaches(SolveState::kConverged));

@@ -26,7 +26,6 @@ struct Solve {
   explicit Solve(const std::vector<Quad>& quads, double target = 0.02, std::size_t memory = std::size_t{1} << 30,
                  std::uint32_t rays_a_shot = 256, std::uint64_t seed = 1)
       : made(makeQuadScene(quads)), rays(rays_a_shot) {
-    settings.reflected = SolverSettings::Reflected::kByRays;
     settings.target_error = target;
     settings.link_memory = memory;
     settings.seed = seed;

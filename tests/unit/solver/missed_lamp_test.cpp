@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 
@@ -54,7 +55,6 @@ struct LampRoom {
 
 struct Solve {
   explicit Solve(test::QuadScene scene, std::uint64_t seed, double target = kTarget) : made(std::move(scene)) {
-    settings.reflected = SolverSettings::Reflected::kByRays;
     settings.target_error = target;
     settings.seed = seed;
     EXPECT_TRUE(rays.setScene(made.patches));
@@ -164,8 +164,8 @@ TEST(MissedLamp, ThatIsSwitchedOnComesOverLinksAsInAFreshSolve) {
   }
 }
 
-// Where an edit brings more leaves than rays have room for, they are given up.
-TEST(MissedLamp, AnEditThatLeavesNoRoomForRaysGoesOnWithoutThem) {
+// Where an edit brings more leaves than rays have room for, all of it is shot.
+TEST(MissedLamp, AnEditThatLeavesNoRoomForRaysIsSolvedByShooting) {
   auto quads = cubeQuads(8, {0, 4}, kGrey);
   Solve room(makeQuadScene(quads), 1, 0.1);
   ASSERT_NE(room.solver->gathered(), nullptr);
@@ -184,9 +184,11 @@ TEST(MissedLamp, AnEditThatLeavesNoRoomForRaysGoesOnWithoutThem) {
   ASSERT_TRUE(room.rays.setScene(after.patches));
   for (const bool fits : {true, false}) {
     room.settings.link_memory = fits ? std::size_t{1} << 30 : 8'000'000;
-    ASSERT_EQ(LinkedSolver::mayGather(map.leaf_altered.size(), room.settings), fits);
-    const LinkedSolver edited(after.patches, after.materials, room.rays, room.settings, {}, *room.solver, map);
-    EXPECT_EQ(edited.gathered() != nullptr, fits);
+    ASSERT_EQ(LinkedSolver::mayGather(*after.patches, room.settings), fits);
+    const FormerSolver former{*room.solver, map, true};
+    const auto edited = makeSolver(after.patches, after.materials, room.rays, room.settings, {}, &former);
+    EXPECT_NE(edited->hasFluxScale(), fits);
+    EXPECT_EQ(edited->isRepairing() || edited->linkCounters().samples > 0, fits) << "what was measured is kept";
   }
 }
 

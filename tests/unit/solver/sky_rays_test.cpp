@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/shooting/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 
@@ -18,7 +19,6 @@ using test::kDark;
 using test::makeQuadScene;
 using test::Quad;
 using test::RayTransport;
-using Reflected = SolverSettings::Reflected;
 
 /// From a face of a cube to the one before it.
 constexpr double kOpposite = 0.1998248957;
@@ -36,10 +36,7 @@ LightSources skyOf(float above, float below) {
 }
 
 struct Solve {
-  explicit Solve(test::QuadScene scene, const LightSources& sources, Reflected reflected = Reflected::kByRays,
-                 double target = 0.005)
-      : made(std::move(scene)) {
-    settings.reflected = reflected;
+  explicit Solve(test::QuadScene scene, const LightSources& sources, double target = 0.005) : made(std::move(scene)) {
     settings.target_error = target;
     EXPECT_TRUE(rays.setScene(made.patches));
     solver = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings, sources);
@@ -84,24 +81,29 @@ TEST(SkyRays, OfTheRightHalfComeThroughAnOpening) {
   }
 }
 
-// By images of the sky, and links of all that it lights: other code but for the leaves.
-TEST(SkyRays, BringWhatLinksBring) {
+// Averaged shooting has images of the sky, and shots of all that it lights: other code but for the leaves.
+TEST(SkyRays, BringWhatShotsBring) {
   const auto made = makeQuadScene(openCube(5, 0.7F));
   const auto sky = skyOf(1.0F, 0.3F);
-  const Solve rays(made, sky), links(made, sky, Reflected::kByLinks, 0.01);
+  const Solve rays(made, sky);
   ASSERT_EQ(rays.outcome, StepOutcome::kConverged);
-  ASSERT_EQ(links.outcome, StepOutcome::kConverged);
+  SolverSettings settings;
+  settings.target_error = 0.02;
+  RayTransport transport(64);
+  ASSERT_TRUE(transport.setScene(made.patches));
+  ShootingSolver shots(made.patches, made.materials, transport, settings, sky);
+  test::solve(shots);
   double square = 0.0, difference = 0.0;
-  const auto by_rays = rays.solver->irradiance(), by_links = links.solver->irradiance();
+  const auto by_rays = rays.solver->irradiance(), by_shots = shots.irradiance();
   for (const auto& side : makeSides(*made.patches)) {
     for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
-      const glm::dvec3 a(by_rays[node]), b(by_links[node]);
+      const glm::dvec3 a(by_rays[node]), b(by_shots[node]);
       square += static_cast<double>(made.patches->node_area[node]) * glm::dot(b, b);
       difference += static_cast<double>(made.patches->node_area[node]) * glm::dot(a - b, a - b);
     }
   }
   // This transport brings a sky to the middles of leaves.
-  EXPECT_LT(std::sqrt(difference / square), 1.5 * std::hypot(rays.solver->error().total, links.solver->error().total));
+  EXPECT_LT(std::sqrt(difference / square), 1.5 * std::hypot(rays.solver->error().total, shots.error().total));
   const auto energy = rays.solver->energy();
   EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
 }
@@ -144,22 +146,6 @@ TEST(SkyRays, WhatWasSavedGoesOnToTheSameEnd) {
   EXPECT_EQ(next.error().total, room.solver->error().total);
   EXPECT_EQ(next.energy().escaped, room.solver->energy().escaped);
   EXPECT_EQ(next.irradiance(), room.solver->irradiance());
-}
-
-// Whether it comes by rays was decided with the scene before an edit; what was saved knows, and the new solver may not.
-TEST(SkyRays, WhatWasSavedByRaysIsRestoredByRays) {
-  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.5F));
-  ArchiveWriter to(std::size_t{64} << 20);
-  ASSERT_TRUE(room.solver->save(to));
-  auto settings = room.settings;
-  settings.reflected = Reflected::kByLinks;
-  LinkedSolver next(room.made.patches, room.made.materials, room.rays, settings, skyOf(1.0F, 0.5F));
-  ArchiveReader from(to.bytes());
-  ASSERT_TRUE(next.restore(from));
-  next.assess();
-  const auto energy = next.energy();
-  EXPECT_EQ(energy.emitted, room.solver->energy().emitted);
-  EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
 }
 
 /// A cube open to the left that a wall parts in two. Of five columns of leaves it stands on the middle one.
@@ -306,7 +292,7 @@ TEST(CutLeaves, AreInDoubtOfLightThatChangesFromLeafToLeaf) {
 
 // Which leaves lie in part inside of something rays alone tell, and they are traced anew when they are needed.
 TEST(PartlyInside, AreSavedWithAllElse) {
-  const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), Reflected::kByRays, 0.02);
+  const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), 0.02);
   ArchiveWriter to(std::size_t{64} << 20);
   ASSERT_TRUE(room.solver->save(to));
   auto transport = room.rays;

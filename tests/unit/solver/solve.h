@@ -7,14 +7,6 @@
 
 namespace radiosity::test {
 
-/// Reflected light comes over links alone.
-inline solver::SolverSettings overLinks(double target_error = solver::SolverSettings{}.target_error) {
-  solver::SolverSettings settings;
-  settings.target_error = target_error;
-  settings.reflected = solver::SolverSettings::Reflected::kByLinks;
-  return settings;
-}
-
 /// Steps until the solver has ended, one way or the other.
 inline solver::StepOutcome runToEnd(solver::Solver& solver) {
   using solver::StepOutcome;

@@ -46,7 +46,6 @@ class BuriedEdgeTest : public testing::Test {
     planner.setReflectance(0.5);
     planner.setShare(40.0 * 3.0 * static_cast<double>(leaf));
     (void)planner.grow(*system_, unshot, patches, 1000, memory);
-    left_out_leaves_ = planner.leftOut() / (3.0 * static_cast<double>(leaf));
   }
   [[nodiscard]] const Shooter* shooterAt(const NodePlace& place) const {
     const auto index = system_->at(place.side, nodeId(sides_[place.side], place));
@@ -56,7 +55,6 @@ class BuriedEdgeTest : public testing::Test {
   test::QuadScene scene_;
   std::vector<Side> sides_;
   std::optional<LinkSystem> system_;
-  double left_out_leaves_ = 0.0;
 };
 
 // Each of them lights one texel more than all others: one that stands for thirteen is a dot beside the edge.
@@ -65,15 +63,14 @@ TEST_F(BuriedEdgeTest, NobodyBesideItPlays) {
     plan(0.15F, seed);  // 0.00375 of a share: would count thirteen times
     for (const auto& shooter : system_->shooters()) EXPECT_TRUE(shooter.certain) << "level " << shooter.place.level;
     ASSERT_NE(shooterAt(kCut), nullptr) << "seed " << seed;
-    EXPECT_EQ(left_out_leaves_, 0.0);
   }
 }
 
-TEST_F(BuriedEdgeTest, WhoWouldCountTooOftenIsLeftOutAndToldOf) {
+// Rays bring its light.
+TEST_F(BuriedEdgeTest, WhoWouldCountTooOftenIsNoShooter) {
   plan(0.05F, 1);
   EXPECT_EQ(shooterAt(kCut), nullptr);
   EXPECT_NE(shooterAt({0, 0, 0, 0}), nullptr);
-  EXPECT_NEAR(left_out_leaves_, 0.05, 1e-4);
 }
 
 /// Lamps with samples of eight points in either half, which differ. The first shines a thousand times as brightly.
@@ -84,8 +81,7 @@ class Waves : public testing::Test {
     bool lacks_samples = false;
   };
   /// `room`: bytes that are left, where a column of the first can grow by a thousand; 0: more than enough, of none.
-  [[nodiscard]] Wanted plan(LinkPlanner::Wave wave, std::uint32_t samples, double target, std::uint32_t lamps = 1,
-                            std::size_t room = 0) const {
+  [[nodiscard]] Wanted plan(std::uint32_t samples, double target, std::uint32_t lamps = 1, std::size_t room = 0) const {
     LinkSystem system(*made_.patches, sides_);
     for (std::uint32_t lamp = 0; lamp < lamps; ++lamp) addLamp(system, lamp, samples);
     for (auto& shooter : system.shooters()) shooter.most_bytes = shooter.column[0].bytes();
@@ -95,8 +91,7 @@ class Waves : public testing::Test {
     const NodeShots shots(*made_.patches, sides_, 1);
     const PlannerSettings settings;
     LinkPlanner planner(*made_.patches, sides_, shots, settings, 1);
-    const auto wanted = planner.improve(system, UnshotPyramid(*made_.patches), *made_.patches, false, wave, memory,
-                                        {1.0, 0.0, 0.0, target});
+    const auto wanted = planner.improve(system, memory, {1.0, target});
     Wanted found{wanted.size(), 0, memory.lacksSamples()};
     for (const auto& want : wanted) {
       EXPECT_GE(want.index, samples) << "none is measured twice";
@@ -128,26 +123,25 @@ class Waves : public testing::Test {
   std::vector<Side> sides_ = makeSides(*made_.patches);
 };
 
-TEST_F(Waves, ThatDoubleBringAsManySamplesAsThereAreAndNoMoreThanTheGoalNeeds) {
-  EXPECT_EQ(plan(LinkPlanner::Wave::kShort, 40, 1e-3).all, 2U * 8U);
-  EXPECT_EQ(plan(LinkPlanner::Wave::kDoubling, 40, 1e-3).all, 2U * 40U);
-  EXPECT_EQ(plan(LinkPlanner::Wave::kShort, 3, 1e-3).all, 2U * 3U);
+TEST_F(Waves, BringAsManySamplesAsThereAreAndNoMoreThanTheGoalNeeds) {
+  EXPECT_EQ(plan(40, 1e-3).all, 2U * 40U);
+  EXPECT_EQ(plan(3, 1e-3).all, 2U * 3U);
   // To 0.9 of the error, surely: the square of it falls as their number, 0.85 x 0.9 takes 1.71 times as many.
-  EXPECT_NEAR(static_cast<double>(plan(LinkPlanner::Wave::kDoubling, 100, 0.9).all), 2.0 * 71.0, 4.0);
+  EXPECT_NEAR(static_cast<double>(plan(100, 0.9).all), 2.0 * 71.0, 4.0);
 }
 
 // One that may only double will want more at once: what others could bring beside that is worth nothing.
 TEST_F(Waves, OfOneNoisyLampAmongManyAreNearlyItsOwn) {
-  const auto wanted = plan(LinkPlanner::Wave::kDoubling, 40, 0.5, 200);
+  const auto wanted = plan(40, 0.5, 200);
   EXPECT_EQ(wanted.of_first, 2U * 40U);
-  EXPECT_LT(wanted.all, 2U * 40U + 2U * 64U) << "a short wave more, at most";
+  EXPECT_LT(wanted.all, 2U * 40U + 2U * 64U) << "a usual wave more, at most";
 }
 
 TEST_F(Waves, TakeTheMemoryOfAColumnThatGrowsOnce) {
-  const auto wanted = plan(LinkPlanner::Wave::kDoubling, 40, 1e-3, 1, 2000);
+  const auto wanted = plan(40, 1e-3, 1, 2000);
   EXPECT_EQ(wanted.all, 2U * 40U);
   EXPECT_FALSE(wanted.lacks_samples);
-  const auto refused = plan(LinkPlanner::Wave::kDoubling, 40, 1e-3, 1, 1999);
+  const auto refused = plan(40, 1e-3, 1, 1999);
   EXPECT_EQ(refused.all, 0U);
   EXPECT_TRUE(refused.lacks_samples);
 }

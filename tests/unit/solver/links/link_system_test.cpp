@@ -22,7 +22,7 @@ class LinkSystems : public testing::Test {
     reflectance_.assign(emission_.size(), glm::vec3(0.5F));
   }
 
-  /// Every wall shoots as a whole, and two of them in four parts as well. Links by chance; each column sums to one.
+  /// Four walls shoot as a whole, two in four parts. Links by chance; each column sums to one.
   [[nodiscard]] LinkSystem makeSystem() const {
     LinkSystem system(*made_.patches, sides_);
     setMaterials(system);
@@ -49,36 +49,14 @@ class LinkSystems : public testing::Test {
         system.addSample(index, half, expander, sample, 1.0);
       }
     };
-    for (std::uint32_t s = 0; s < 6; ++s) add({s, sides_[s].level_count - 1, 0, 0});
+    for (std::uint32_t s = 2; s < 6; ++s) add({s, sides_[s].level_count - 1, 0, 0});
     for (std::uint32_t s = 0; s < 2; ++s) {
       for (std::uint32_t i = 0; i < 4; ++i) add({s, sides_[s].level_count - 2, i % 2, i / 2});
     }
     return system;
   }
 
-  /// Links of a shooter to the leaves of a side as the equation takes them: where its children stand beside it, each
-  /// with one point as it has itself, theirs are four measurements more.
-  void linksOf(const LinkSystem& system, std::size_t half, std::size_t k, const Side& side,
-               std::vector<float>& links) const {
-    const auto& shooters = system.shooters();
-    links.assign(side.leaf_count, 0.0F);
-    (void)shooters[k].column[half].decode(side.first_value, links);
-    std::vector<float> child(links.size()), sum(links.size(), 0.0F);
-    bool all = shooters[k].weight[half] == 1.0;
-    std::size_t children = 0;
-    for (const auto& shooter : shooters) {
-      if (shooter.parent != k) continue;
-      ++children;
-      all = all && shooter.weight[half] == 1.0 && shooter.column[half].points() > 0.0;
-      std::fill(child.begin(), child.end(), 0.0F);
-      (void)shooter.column[half].decode(side.first_value, child);
-      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += child[i];
-    }
-    if (!all || children != 4) return;
-    for (std::size_t i = 0; i < sum.size(); ++i) links[i] = (links[i] + 4.0F * sum[i]) / 5.0F;
-  }
-
-  /// Mean radiosities b of red by elimination: b_m - sum over n of K_mn w_n (b_n - b_parent(n)) = e_m.
+  /// Mean radiosities b of red by elimination: b_m - sum over n of K_mn w_n b_n = e_m.
   [[nodiscard]] std::vector<double> eliminate(const LinkSystem& system, std::size_t half) const {
     const auto& shooters = system.shooters();
     const std::size_t n = shooters.size();
@@ -89,7 +67,7 @@ class LinkSystems : public testing::Test {
       a[m][m] += 1.0;
       for (std::size_t k = 0; k <= n; ++k) {
         std::vector<float> links(side.leaf_count, 0.0F);
-        if (k < n) linksOf(system, half, k, side, links);
+        if (k < n) (void)shooters[k].column[half].decode(side.first_value, links);
         double mean = 0.0;
         for (auto y = rect.y0; y < rect.y1; ++y) {
           for (auto x = rect.x0; x < rect.x1; ++x) {
@@ -104,9 +82,7 @@ class LinkSystems : public testing::Test {
           a[m][n] = mean;
           continue;
         }
-        mean *= shooters[k].weight[half];
-        a[m][k] -= mean;
-        if (shooters[k].parent != scene::kNone) a[m][shooters[k].parent] += mean;
+        a[m][k] -= mean * shooters[k].weight[half];
       }
     }
     for (std::size_t i = 0; i < n; ++i) {
@@ -180,59 +156,6 @@ TEST_F(LinkSystems, OfManyColoursAreSolvedLeafByLeaf) {
   system.solve();
   const auto exact = eliminate(system, 1);
   for (std::size_t m = 0; m < exact.size(); ++m) EXPECT_NEAR(system.shooters()[m].mean[1].x, exact[m], 3e-6);
-}
-
-/// Emission differs across two walls, so that what children shoot beside their parents' mean counts; the children of
-/// one wall lack a column in one half.
-TEST_F(LinkSystems, TakeTheLinksOfAllChildrenForFurtherOnesOfTheirParent) {
-  paint(0.6F);
-  for (std::uint32_t s = 0; s < 2; ++s) {
-    for (std::uint32_t leaf = 0; leaf < sides_[s].leaf_count; ++leaf)
-      emission_[sides_[s].first_value + leaf] = glm::vec3(static_cast<float>(leaf % kLeaves));
-  }
-  auto system = makeSystem();
-  system.forget(8, 0);  // a child of the first wall
-  system.solve();
-  EXPECT_EQ(system.shooters()[0].own[0], 1.0);
-  EXPECT_DOUBLE_EQ(system.shooters()[0].own[1], 0.2);
-  EXPECT_DOUBLE_EQ(system.shooters()[1].own[0], 0.2);
-  EXPECT_EQ(system.shooters()[2].own[0], 1.0) << "it has no children";
-  for (std::size_t half = 0; half < 2; ++half) {
-    const auto exact = eliminate(system, half);
-    const double largest = *std::max_element(exact.begin(), exact.end());
-    std::vector<glm::vec3> irradiance;
-    system.irradiance(half, irradiance);
-    std::vector<float> links;
-    std::vector<double> sum(sides_[4].leaf_count, 0.0);
-    for (std::size_t n = 0; n < exact.size(); ++n) {
-      EXPECT_NEAR(system.shooters()[n].mean[half].x, exact[n], 1e-5 * largest);
-      const auto parent = system.shooters()[n].parent;
-      const double sent = parent == scene::kNone ? exact[n] : exact[n] - exact[parent];
-      linksOf(system, half, n, sides_[4], links);
-      for (std::size_t leaf = 0; leaf < sum.size(); ++leaf) sum[leaf] += sent * static_cast<double>(links[leaf]);
-    }
-    for (std::size_t leaf = 0; leaf < sum.size(); ++leaf)
-      EXPECT_NEAR(irradiance[sides_[4].first_value + leaf].x, sum[leaf], 1e-5 * sum[leaf]);
-  }
-}
-
-/// The parent has one point, its children 1, 1, 1 and 3: as one measurement they have 16 / (1 + 1 + 1 + 1/3) points.
-TEST_F(LinkSystems, WeighChildrenByTheirPoints) {
-  lightWall(0, glm::vec3(1.0F));
-  auto system = makeSystem();
-  LinkSample sample;
-  for (std::uint32_t i = 0; i < sides_[3].leaf_count; ++i) sample.add(sides_[3].first_node + i, 0.1F);
-  LinkExpander expander(*made_.patches, sides_);
-  expander.expand(sample);
-  system.addSample(7, 1, expander, sample, 2.0);
-  system.solve();
-  EXPECT_DOUBLE_EQ(system.shooters()[0].own[0], 0.2);
-  EXPECT_DOUBLE_EQ(system.shooters()[0].own[1], 1.0 / (1.0 + 16.0 / (3.0 + 1.0 / 3.0)));
-  for (auto& shooter : system.shooters()) {
-    if (shooter.parent == scene::kNone) shooter.weight[1] = 2.0;
-  }
-  system.solve();
-  EXPECT_EQ(system.shooters()[0].own[1], 0.0) << "by children that are sure, rather than by chance";
 }
 
 TEST_F(LinkSystems, SolvedInTheSmallestSlicesHaveTheSameBits) {

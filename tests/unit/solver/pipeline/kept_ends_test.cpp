@@ -43,7 +43,6 @@ TEST(KeptEnds, OneTakesThePlaceOfAnotherWithItsKeyAndTheTooLargeNone) {
 class KeptEndsOfASolve : public testing::Test {
  protected:
   KeptEndsOfASolve() : quads_(test::cubeQuads(8, {0, 4, 0, 0, 0, 0}, test::kGrey)) {
-    settings_.reflected = SolverSettings::Reflected::kByRays;
     made_ = test::makeQuadScene(quads_);
     EXPECT_TRUE(transport_.setScene(made_.patches));
     solver_ = make();

@@ -25,7 +25,7 @@ class LinkedEdits : public testing::Test {
   void SetUp() override {
     made_ = makeQuadScene(quads_);
     ASSERT_TRUE(rays_.setScene(made_.patches));
-    solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, rays_, test::overLinks());
+    solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, rays_, SolverSettings{});
     solve(*solver_);
   }
 
@@ -65,7 +65,7 @@ TEST_F(LinkedEdits, OfReflectanceAgreeWithFreshSolvesAsTheseAgreeWithEachOther) 
   const auto painted = makeQuadScene(quads_);
   std::vector<std::vector<glm::vec3>> before, after;
   for (const std::uint64_t seed : {1, 11, 12, 13}) {
-    auto settings = test::overLinks();
+    SolverSettings settings;
     settings.seed = seed;
     LinkedSolver solver(made_.patches, made_.materials, rays_, settings);
     solve(solver);
@@ -76,7 +76,7 @@ TEST_F(LinkedEdits, OfReflectanceAgreeWithFreshSolvesAsTheseAgreeWithEachOther) 
   }
   std::vector<std::vector<glm::vec3>> fresh;
   for (std::uint64_t seed = 2; seed < 10; ++seed) {
-    auto other = test::overLinks();
+    SolverSettings other;
     other.seed = seed;
     LinkedSolver again(painted.patches, painted.materials, rays_, other);
     solve(again);
@@ -127,19 +127,19 @@ LightSources lamp(const glm::dvec3& at, float candela) {
 }
 
 TEST_F(LinkedEdits, WhileALampIsHalfMeasuredLoseNoHalf) {
-  LinkedSolver solver(made_.patches, made_.materials, rays_, test::overLinks(), lamp({0.1, 0.2, 0.0}, 5.0F));
+  LinkedSolver solver(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 5.0F));
   ASSERT_TRUE(solver.step());
   ASSERT_TRUE(solver.step());
   solver.setLights(lamp({0.1, 0.2, 0.0}, 10.0F));
   solve(solver);
-  LinkedSolver fresh(made_.patches, made_.materials, rays_, test::overLinks(), lamp({0.1, 0.2, 0.0}, 10.0F));
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 10.0F));
   solve(fresh);
   const auto node = made_.patches->surfaces[0].first_node[0] + 5;
   EXPECT_NEAR(solver.irradiance()[node].x / fresh.irradiance()[node].x, 1.0F, 0.06F);
 }
 
 TEST_F(LinkedEdits, ALampTooWeakForTheTargetIsMeasuredWhenTheTargetFalls) {
-  SolverSettings settings = test::overLinks();
+  SolverSettings settings;
   settings.target_error = 0.1;
   LinkedSolver solver(made_.patches, made_.materials, rays_, settings);
   solve(solver);
@@ -161,7 +161,7 @@ TEST_F(LinkedEdits, ALampDraggedAboutLeavesNoTrail) {
   }
   EXPECT_LE(solver_->system().shooters().size(), shooters);
   solve(*solver_);
-  LinkedSolver fresh(made_.patches, made_.materials, rays_, test::overLinks(),
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{},
                      lamp({0.002 * 199 - 0.2, 0.1, 0.0}, 3.0F));
   solve(fresh);
   const auto node = made_.patches->surfaces[0].first_node[0] + 5;
@@ -189,7 +189,7 @@ TEST(LinkedSolver, ATinyLightIsNotBlack) {
   const auto made = makeQuadScene(quads);
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
+  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
   solve(solver);
   const auto energy = solver.energy();
   EXPECT_NEAR(energy.absorbed[0] / energy.emitted[0], 1.0, 0.05);
@@ -203,7 +203,7 @@ TEST(LinkedSolver, LightThatReachesNothingLeavesNoError) {
     emission.set(leaf, 0.1F * static_cast<float>(leaf % 7 + leaf / 30) * emission[leaf]);
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
+  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
   EXPECT_GT(solver.error().total, 0.5) << "nobody has looked yet";
   solve(solver);
   EXPECT_EQ(solver.error().total, 0.0);
@@ -225,13 +225,13 @@ TEST(LinkedSolver, ADimLampBesideABrightSignIsNotLeftOut) {
     }
     RayTransport rays(64);
     ASSERT_TRUE(rays.setScene(made.patches));
-    SolverSettings settings = test::overLinks();
+    SolverSettings settings;
     settings.target_error = 0.03;
     LinkedSolver solver(made.patches, made.materials, rays, settings);
     solve(solver);
     double light = 0.0;
     for (const auto& irradiance : solver.irradiance()) light += static_cast<double>(irradiance.x);
-    EXPECT_NEAR(light, 2.3, 0.1) << bright;
+    EXPECT_NEAR(light, 2.417, 0.1) << bright;  // by quadrature, 16 points a leaf
     EXPECT_LE(solver.error().total, 0.03) << bright;
   }
 }
@@ -250,39 +250,8 @@ double awayFromFurnace(const LinkedSolver& solver, const scene::PatchScene& patc
   return std::sqrt(square / area);
 }
 
-// Whoever asks for less than can be had in the time there is sees as much as somebody who asks for just that.
-TEST(LinkedSolver, ASmallErrorIsReachedByWayOfLargerOnes) {
-  const auto made = makeQuadScene(cubeQuads(8, {0, 4, 0, 0, 0, 0}, {0.5F, 0.6F, 0.7F, 0.5F, 0.3F, 0.5F}));
-  struct Work {
-    std::uint64_t shots = 0;
-    std::uint32_t resolution = 0;
-  };
-  const auto workTo = [&](double error, double target) {
-    RayTransport rays(64);
-    EXPECT_TRUE(rays.setScene(made.patches));
-    SolverSettings settings = test::overLinks();
-    settings.target_error = target;
-    LinkedSolver solver(made.patches, made.materials, rays, settings);
-    for (int i = 0; i < 100'000; ++i) {
-      const auto outcome = solver.step();
-      if (!outcome || *outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) break;
-      if (*outcome == StepOutcome::kRoundDone && solver.error().total <= error) break;
-    }
-    EXPECT_LE(solver.error().total, error);
-    Work work{solver.shots(), 0};
-    for (const auto& shooter : solver.system().shooters())
-      work.resolution = std::max(work.resolution, shooter.resolution);
-    return work;
-  };
-  const auto straight = workTo(0.02, 0.02), on_the_way = workTo(0.02, 1e-3);
-  EXPECT_LE(on_the_way.shots, straight.shots);
-  EXPECT_EQ(on_the_way.resolution, straight.resolution);
-  EXPECT_GT(workTo(2e-3, 2e-3).resolution, straight.resolution);
-}
-
-// At a time limit the wave under way ends. The nodes that it was to measure are shooters by then: their light is not
-// unshot, and goes nowhere.
-TEST(LinkedSolver, LightOfShootersThatAShortenedWaveDidNotMeasureIsStatedAsMissing) {
+// At a time limit the wave under way ends, and what it was to measure sends nothing.
+TEST(LinkedSolver, LightOfLampsThatAShortenedWaveDidNotMeasureIsStatedAsMissing) {
   const float reflectance = 0.8F;
   const auto made = makeQuadScene(cubeQuads(8, {1, 1, 1, 1, 1, 1}, {0.8F, 0.8F, 0.8F, 0.8F, 0.8F, 0.8F}));
   bool missing = false;
@@ -290,7 +259,7 @@ TEST(LinkedSolver, LightOfShootersThatAShortenedWaveDidNotMeasureIsStatedAsMissi
     RayTransport rays(256);
     rays.pause = std::chrono::milliseconds(10);  // so that a wave takes several slices
     ASSERT_TRUE(rays.setScene(made.patches));
-    LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
+    LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
     for (int i = 0; i < steps; ++i) ASSERT_TRUE(solver.step());
     solver.endWave();
     for (int i = 0; i < 100; ++i) {
@@ -301,9 +270,9 @@ TEST(LinkedSolver, LightOfShootersThatAShortenedWaveDidNotMeasureIsStatedAsMissi
     solver.assess();
     const double truth = awayFromFurnace(solver, *made.patches, 1.0 / (1.0 - static_cast<double>(reflectance)));
     EXPECT_LT(truth, 1.5 * solver.error().total) << steps;
-    missing = missing || (truth > 0.1 && solver.system().shooters().size() > 6);
+    missing = missing || truth > 0.1;
   }
-  EXPECT_TRUE(missing) << "no wave of reflected light was cut short";
+  EXPECT_TRUE(missing) << "no wave was cut short";
 }
 
 class LinkMemoryBound : public testing::Test {
@@ -341,7 +310,7 @@ class LinkMemoryBound : public testing::Test {
     for (int i = 0; i < 20'000; ++i) {
       const auto outcome = solver_->step();
       if (!outcome) break;
-      EXPECT_LE(solver_->system().bytes(), settings_.link_memory);
+      EXPECT_LE(solver_->linkCounters().bytes, settings_.link_memory);
       if (*outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) return *outcome;
     }
     ADD_FAILURE() << "no end";
@@ -351,23 +320,24 @@ class LinkMemoryBound : public testing::Test {
   std::vector<test::Quad> quads_;
   test::QuadScene made_;
   std::unique_ptr<RayTransport> rays_;
-  SolverSettings settings_ = test::overLinks();
+  SolverSettings settings_;
   std::unique_ptr<LinkedSolver> solver_;
 };
 
 TEST_F(LinkMemoryBound, IsNeverPassedAndEndsTheSolve) {
-  for (const std::size_t bytes : {20'000U, 45'000U, 200'000U}) {
+  for (const std::size_t bytes : {480'000U, 700'000U, 3'000'000U}) {
     make(bytes, 1e-6);
     EXPECT_EQ(run(), StepOutcome::kExhausted);
     EXPECT_EQ(solver_->limit(), SolveLimit::kLinkMemory);
-    EXPECT_GT(solver_->system().bytes(), bytes / 2);  // and it is made use of
+    // And it is made use of. The equation on leaves takes most of the least there may be, and half is kept for links.
+    EXPECT_GT(solver_->linkCounters().bytes, bytes > 1'000'000 ? bytes / 4 : bytes / 64) << bytes;
     EXPECT_GT(solver_->error().total, 1e-6);
     EXPECT_EQ(run(), StepOutcome::kExhausted);
   }
 }
 
 TEST_F(LinkMemoryBound, LeavesAnErrorThatIsStated) {
-  make(45'000, 1e-6);
+  make(500'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   const auto limited = solver_->irradiance();
   const double stated = solver_->error().total;
@@ -376,7 +346,7 @@ TEST_F(LinkMemoryBound, LeavesAnErrorThatIsStated) {
 }
 
 TEST_F(LinkMemoryBound, ThatIsUsedUpDoesNotMakeAnEditStartOver) {
-  make(45'000, 1e-6);
+  make(500'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   const auto before = solver_->irradiance();
   const auto shooters = solver_->system().shooters().size();
@@ -392,18 +362,18 @@ TEST_F(LinkMemoryBound, ThatIsUsedUpDoesNotMakeAnEditStartOver) {
 }
 
 TEST_F(LinkMemoryBound, HoldsWhenTexturesMakeThreeRowsOfOne) {
-  make(45'000, 1e-6);
+  make(500'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   auto textured = made_.materials;
   for (std::uint32_t node = 0; node < made_.patches->nodeCount(); node += 2)
     textured.reflectance.set(node, 0.8F * textured.reflectance[node]);
   solver_->setMaterials(textured);
-  EXPECT_LE(solver_->system().bytes(), settings_.link_memory);
+  EXPECT_LE(solver_->linkCounters().bytes, settings_.link_memory);
   EXPECT_EQ(run(), StepOutcome::kExhausted);
 }
 
 TEST_F(LinkMemoryBound, ThatTheThreeRowsAloneWouldPassIsUsedForFewerShooters) {
-  make(300'000, 1e-6);
+  make(600'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   const double before = solver_->error().total;
   auto textured = made_.materials;
@@ -411,12 +381,11 @@ TEST_F(LinkMemoryBound, ThatTheThreeRowsAloneWouldPassIsUsedForFewerShooters) {
     textured.reflectance.set(node, 0.98F * textured.reflectance[node]);
   solver_->setMaterials(textured);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
-  // Some two thirds of the shooters: their error is larger, but not that of light without bounces, which is above 1.
-  EXPECT_LT(solver_->error().total, 10.0 * before + 0.05) << "nearly all links were thrown away";
+  EXPECT_LT(solver_->error().total, 10.0 * before + 0.05) << "nearly all was thrown away";
 }
 
 TEST_F(LinkMemoryBound, AnEditOfALimitedSolveIsNotConvergedAboveItsTarget) {
-  make(45'000, 0.01);
+  make(500'000, 0.01);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   for (int i = 0; i < 4; ++i) {
     quads_[1].emission *= 0.25F;
@@ -456,7 +425,7 @@ TEST_F(LinkMemoryBound, AWaveThatIsCutShortIsSolvedForAtOnceAndItsErrorStated) {
 }
 
 TEST_F(LinkMemoryBound, ThatIsUsedUpStillHasRoomForNewLamps) {
-  make(45'000, 1e-6);
+  make(500'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   LightSources lamps;
   for (int i = 0; i < 12; ++i)
@@ -466,21 +435,34 @@ TEST_F(LinkMemoryBound, ThatIsUsedUpStillHasRoomForNewLamps) {
   const auto limited = solver_->irradiance();
   const auto& shooters = solver_->system().shooters();
   EXPECT_TRUE(std::none_of(shooters.begin(), shooters.end(), [](const Shooter& shooter) { return shooter.owes(); }));
-  // What the shooters that lost their links to the lamps would have sent is missing, and stated.
   const double stated = solver_->error().total;
   EXPECT_LT(stated, 1.0);
   EXPECT_LT(awayFromTruth(limited, lamps), 1.5 * std::hypot(stated, 0.01));
+}
+
+// There all light is shot, in rounds that are averaged.
+TEST_F(LinkMemoryBound, ThatHasNoRoomForRaysLeavesASolveThatReachesItsTarget) {
+  make(std::size_t{1} << 30, 0.03);
+  settings_.link_memory = 45'000;
+  EXPECT_FALSE(LinkedSolver::mayGather(*made_.patches, settings_));
+  const auto scarce = makeSolver(made_.patches, made_.materials, *rays_, settings_);
+  ASSERT_TRUE(scarce->hasFluxScale());
+  test::solve(*scarce);
+  const double stated = scarce->error().total;
+  EXPECT_LE(stated, settings_.target_error);
+  EXPECT_EQ(scarce->linkCounters().bytes, 0U);
+  EXPECT_LT(awayFromTruth(scarce->irradiance(), {}), 1.5 * std::hypot(stated, 0.01));
 }
 
 TEST(LinkMemory, IsNotAskedForWhereLightsAloneWouldTakeHalfOfIt) {
   const auto made = makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
   RayTransport rays(16);
   ASSERT_TRUE(rays.setScene(made.patches));
-  SolverSettings settings = test::overLinks();
-  settings.link_memory = 100'000;  // room for 400 shooters
+  SolverSettings settings;
+  settings.link_memory = 200'000;  // room for rays
   LightSources lamps;
   EXPECT_FALSE(makeSolver(made.patches, made.materials, rays, settings, lamps)->hasFluxScale());
-  for (int i = 0; i < 200; ++i) lamps.lights.push_back({.position = {0.002 * i, 0, 0}, .intensity = glm::vec3(1.0F)});
+  for (int i = 0; i < 400; ++i) lamps.lights.push_back({.position = {0.002 * i, 0, 0}, .intensity = glm::vec3(1.0F)});
   EXPECT_TRUE(makeSolver(made.patches, made.materials, rays, settings, lamps)->hasFluxScale());
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -161,19 +162,24 @@ TEST(ShadedLeaves, ReflectedLightCountsByTheCosineWithTheShadingNormal) {
   }
 }
 
-/// Where there are no rays nodes count by some of their points, which near by are a coarse picture of them.
-TEST(ShadedLeaves, ReflectedLightOverLinksCountsByTheCosineWithTheShadingNormal) {
-  std::array<float, 6> shines{}, reflects{};
-  shines.fill(1.0F);
-  reflects.fill(0.5F);
-  const auto made = makeQuadScene(cubeQuads(6, shines, reflects));
-  std::vector<glm::vec3> normals(6, glm::vec3(0.0F));
-  const auto& frame = made.patches->triangles[made.patches->surfaces[0].first_triangle];
+/// Nodes that shine count by some of their points, which near by are a coarse picture of them; a lamp by its polygon.
+TEST(ShadedLeaves, LightOfABrightNodeCountsByTheCosineWithTheShadingNormal) {
+  auto quads = cubeQuads(6, test::kDark, test::kDark);
+  quads.push_back({{-0.1F, 0.3F, -0.1F}, {0.2F, 0, 0}, {0, 0, 0.2F}, 4, 4, glm::vec3(100.0F), glm::vec3(0.0F)});
+  const auto lamp = makeQuadScene(quads);
+  auto nodes = makeQuadScene(quads);
+  const auto& panel = nodes.patches->surfaces[6];
+  for (std::uint32_t leaf = 0; leaf < panel.width * panel.height; ++leaf)
+    nodes.materials.emission.set(panel.first_node[0] + leaf, glm::vec3(leaf % 2 == 0 ? 99.0F : 101.0F));
+  std::vector<glm::vec3> normals(7, glm::vec3(0.0F));
+  const auto& frame = lamp.patches->triangles[lamp.patches->surfaces[0].first_triangle];
   normals[0] =
       glm::vec3(std::cos(0.5) * glm::dvec3(frame.normal) + std::sin(0.5) * glm::dvec3(glm::normalize(frame.du)));
-  const Solve solved(made, normals, 0.01, {}, test::overLinks());
-  EXPECT_EQ(solved.solver->gathered(), nullptr);
-  EXPECT_NEAR(solved.mean(0), 1.0 + std::cos(0.5), 0.03 * (1.0 + std::cos(0.5)));
+  const Solve of_lamp(lamp, normals, 0.01), of_nodes(nodes, normals, 0.01);
+  const auto isNode = [](const Shooter& shooter) { return !shooter.isLight(); };
+  EXPECT_TRUE(std::ranges::any_of(of_nodes.solver->system().shooters(), isNode));
+  EXPECT_FALSE(std::ranges::any_of(of_lamp.solver->system().shooters(), isNode));
+  EXPECT_NEAR(of_nodes.mean(0), of_lamp.mean(0), 0.03 * of_lamp.mean(0));
 }
 
 /// A wall under a sky that shines above the horizon alone: the quarter of all directions that it sees is as far from
