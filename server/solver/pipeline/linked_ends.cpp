@@ -48,7 +48,7 @@ bool LinkedSolver::takeKeptEnd() {
   const auto kept = ends_.find(lightKey());
   if (!kept || !(kept->error.total <= settings_.target_error)) return false;
   half_ = kept->half;
-  shaded_ = kept->shaded;
+  shaded_.set(kept->shaded);
   error_ = kept->error;
   shown_ = kept;
   phase_ = Phase::kDone;
@@ -63,7 +63,7 @@ void LinkedSolver::endHere() {
   auto end = std::make_shared<KeptEnd>();
   end->key = lightKey();
   end->half = half_;
-  end->shaded = shaded_;
+  end->shaded = shaded_.values();
   end->error = error_;
   end->common = commonOfLeaves();
   const auto corrections = this->corrections();

@@ -139,7 +139,7 @@ std::shared_ptr<const LeafRays> LinkedSolver::leafRays() {
 void LinkedSolver::startRays() {
   gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays(),
                                          system_.leafAreas());
-  gather_->shadeFor(&shading_);
+  gather_->shadeFor(&shaded_.shading());
 }
 
 std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {

@@ -15,10 +15,10 @@ std::vector<glm::vec3> LinkedSolver::irradiance() const {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       values[side.first_node + leaf] = lightOf(side.first_value + leaf);
   }
-  addShaded(shaded_, kBothHalves, values);
+  shaded_.addTo(kBothHalves, values);
   for (const auto& [value, lacks] : corrections()) {
     auto& light = values[nodeOf(value)];
-    const auto more = shadedCorrection(value, 0.5F * (lacks[0] + lacks[1]));
+    const auto more = shaded_.correction(value, lightOf(value), 0.5F * (lacks[0] + lacks[1]));
     light = glm::max(light + more, glm::vec3(0.0F));  // by noise it might be less
   }
   return values;
@@ -34,9 +34,10 @@ std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_)
     std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
-  addShaded(shaded_, half, values);
+  shaded_.addTo(half, values);
   for (const auto& correction : corrections())
-    values[nodeOf(correction.value)] += shadedCorrection(correction.value, correction.lacks[half]);
+    values[nodeOf(correction.value)] +=
+        shaded_.correction(correction.value, lightOf(correction.value), correction.lacks[half]);
   return values;
 }
 

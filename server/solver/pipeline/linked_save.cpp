@@ -86,7 +86,8 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
   archive(self.lights_, self.sources_, self.sky_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
           self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.rounds_,
           self.solutions_, self.sweeps_, self.replayed_, self.half_, self.refined_, self.by_links_, self.error_,
-          self.counters_, self.sample_goal_, self.aim_, self.sampled_alone_, self.shaded_, self.in_haste_, self.rough_);
+          self.counters_, self.sample_goal_, self.aim_, self.sampled_alone_, self.in_haste_, self.rough_);
+  ShadedLight::visit(archive, self.shaded_);
   DirectSmoothing::visit(archive, self.direct_smoothing_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
@@ -130,7 +131,7 @@ bool LinkedSolver::restoreShown(ArchiveReader& from) {
   from(end->corrections, end->common);
   end->key = lightKey();
   end->half = half_;
-  end->shaded = shaded_;
+  end->shaded = shaded_.values();
   end->error = error_;
   shown_ = std::move(end);
   const auto leaves = system_.leafAreas().size();
@@ -156,8 +157,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
            (shooter.crowd == scene::kNone || (shooter.crowd < crowds_.size() && shooter.sample_cost > 0.0));
   };
   const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
-  if (half_[0].size() != values || half_[1].size() != values || shaded_[0].size() != shading_.size() ||
-      shaded_[1].size() != shading_.size() || measured_ > wanted_.size() ||
+  if (half_[0].size() != values || half_[1].size() != values || !shaded_.isWhole() || measured_ > wanted_.size() ||
       !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists) ||
       !std::all_of(rough_.begin(), rough_.end(), exists) || !direct_smoothing_.fits(values))
     return false;

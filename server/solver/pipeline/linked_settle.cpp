@@ -50,15 +50,13 @@ bool LinkedSolver::settle() {
 }
 
 /// Where rays bring the rest.
-void LinkedSolver::smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves,
-                                ShadedLight& factors) const {
-  for (auto& half : factors) half.clear();
-  if (!gather_) return;
+ShadedLight::Values LinkedSolver::smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves) const {
+  if (!gather_) return {};
   const auto is_parted = [this](std::uint32_t value) { return gather_->sights().isParted(value); };
   DirectSmoothing::Halves raw;
-  if (!shading_.empty()) raw = halves;
+  if (!shaded_.empty()) raw = halves;
   smoothing.smooth(sides_, system_.leafAreas(), is_parted, halves);
-  if (!shading_.empty()) shadedFactors(raw, halves, factors);
+  return shaded_.empty() ? ShadedLight::Values{} : shaded_.factors(raw, halves);
 }
 
 /// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
@@ -66,7 +64,7 @@ bool LinkedSolver::lightLeaves() {
   if (pass_ != Pass::kRays) {
     expander_.forget();
     inBothHalves([&](std::size_t half) { system_.irradiance(half, over_links_[half]); });
-    smoothDirect(direct_smoothing_, over_links_, shaded_factors_);
+    shaded_.scaleNext(smoothDirect(direct_smoothing_, over_links_));
     pass_ = Pass::kRays;
     if (gather_) gather_->begin(leftLight());
   }
@@ -77,7 +75,7 @@ bool LinkedSolver::lightLeaves() {
       for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
     });
   }
-  shadeLeaves();
+  shaded_.update(shootersAndLights(), gather_.get());
   if (gather_) gather_->forgetIrradiance();
   pass_ = Pass::kNone;
   findUnshot();

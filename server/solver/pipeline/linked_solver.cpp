@@ -49,6 +49,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       memory_(*patches_, sides_, settings.link_memory / 2),  // rays may take the other half
       unshot_(*patches_),
       planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
+      shaded_(*patches_, sides_),
       ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
@@ -65,6 +66,11 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
+}
+
+void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals) {
+  shaded_.shadeFor(std::move(normals));
+  if (gather_) gather_->shadeFor(&shaded_.shading());
 }
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {

@@ -23,9 +23,9 @@
 #include "server/solver/patches/lights.h"
 #include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/pipeline/kept_ends.h"
+#include "server/solver/pipeline/shaded_light.h"
 #include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/reflected/leaf_gather.h"
-#include "server/solver/reflected/leaf_shading.h"
 #include "server/solver/solver.h"
 #include "server/solver/transport/node_shots.h"
 #include "server/solver/variation/leaf_variation.h"
@@ -238,20 +238,10 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] StepOutcome assessed();
   [[nodiscard]] bool mayGoWithout();
   [[nodiscard]] bool lightLeaves();
-  void shadeLeaves();
-  /// By half and number of LeafShading: what counts for the shading normal less what does for the geometric one.
-  using ShadedLight = std::array<std::vector<glm::vec3>, 2>;
-  void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
-  /// `factors`: for what addShadedLinks() adds; empty: none.
-  void smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves, ShadedLight& factors) const;
+  /// Returns what ShadedLight is to make of the change.
+  [[nodiscard]] ShadedLight::Values smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves) const;
   [[nodiscard]] std::vector<float> commonOfLeaves() const;
-  void shadedFactors(const DirectSmoothing::Halves& raw, const DirectSmoothing::Halves& smooth,
-                     ShadedLight& factors) const;
-  static void scaleShaded(const ShadedLight& factors, ShadedLight& light);
-  [[nodiscard]] ShadingEmitter emitterOf(const Shooter& shooter) const;
-  [[nodiscard]] ShadingEmitter emitterOf(const NodePlace& node) const;
-  [[nodiscard]] glm::vec3 shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const;
-  void addShaded(const ShadedLight& light, std::uint32_t half, std::vector<glm::vec3>& nodes) const;
+  [[nodiscard]] ShootersAndLights shootersAndLights() const { return {system_, lights_, sources_, crowds_}; }
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   [[nodiscard]] bool settle();
@@ -390,9 +380,7 @@ class LinkedSolver final : public Solver {
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
   bool all_unshot_ = false;                     // an AllUnshot lives
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
-  LeafShading shading_;
-  ShadedLight shaded_;          // to be added to half_ where it is told
-  ShadedLight shaded_factors_;  // of a new solution, until it is told
+  ShadedLight shaded_;                          // to be added to half_ where it is told
   DirectSmoothing direct_smoothing_;
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
   std::unique_ptr<LeafVariation> variation_;          // once little else is in error

@@ -179,8 +179,7 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   std::array<std::vector<glm::vec3>, 2> halves;
   inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
   DirectSmoothing smoothing;
-  ShadedLight factors;
-  smoothDirect(smoothing, halves, factors);
+  const auto factors = smoothDirect(smoothing, halves);
   std::vector<glm::vec3> irradiance(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -188,12 +187,7 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
       irradiance[side.first_node + leaf] = 0.5F * (halves[0][v] + halves[1][v]);
     }
   }
-  if (shading_.empty()) return irradiance;
-  ShadedLight shaded;
-  for (auto& half : shaded) half.assign(shading_.size(), glm::vec3(0.0F));
-  addShadedLinks(LinkSystem::From::kLights, shaded);
-  scaleShaded(factors, shaded);
-  addShaded(shaded, kBothHalves, irradiance);
+  shaded_.addDirectTo(shootersAndLights(), factors, irradiance);
   return irradiance;
 }
 

@@ -1,11 +1,12 @@
-// LinkedSolver and normals that are not the surfaces' own: what it tells of light is for these.
+#include "server/solver/pipeline/shaded_light.h"
+
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
 
 #include "common/parallel.h"
-#include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/math/halves.h"
 
 namespace radiosity::solver {
 namespace {
@@ -58,25 +59,30 @@ ShadingEmitter emitterOf(const Crowd& crowd) {
 
 }  // namespace
 
-void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals) {
-  shading_ = LeafShading(*patches_, sides_, std::move(normals));
-  for (auto& half : shaded_) half.assign(shading_.size(), glm::vec3(0.0F));
-  if (gather_) gather_->shadeFor(&shading_);
+void ShadedLight::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals) {
+  shading_ = LeafShading(patches_, sides_, std::move(normals));
+  values_ = zeros();
+}
+
+ShadedLight::Values ShadedLight::zeros() const {
+  Values values;
+  for (auto& half : values) half.assign(shading_.size(), glm::vec3(0.0F));
+  return values;
 }
 
 /// Of the leaves that it has area on, some, evenly.
-ShadingEmitter LinkedSolver::emitterOf(const NodePlace& node) const {
+ShadingEmitter ShadedLight::emitterOf(const NodePlace& node) const {
   ShadingEmitter emitter;
   emitter.kind = ShadingEmitter::Kind::kPatches;
   const Side& side = sides_[node.side];
   const auto rect = leafRect(side, node);
-  const auto& surface = patches_->surfaces[side.surface];
+  const auto& surface = patches_.surfaces[side.surface];
   const auto width = rect.x1 - rect.x0, all = width * (rect.y1 - rect.y0), count = std::min(all, kNodeLeaves);
   for (std::uint32_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::uint32_t>((2 * std::uint64_t{k} + 1) * all / (2 * std::uint64_t{count}));
     const auto leaf = (rect.y0 + at / width) * side.width + rect.x0 + at % width;
-    const auto& point = patches_->leaves[surface.first_leaf + leaf];
-    const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+    const auto& point = patches_.leaves[surface.first_leaf + leaf];
+    const auto area = static_cast<double>(patches_.node_area[side.first_node + leaf]);
     if (point.triangle == scene::kNone || area <= 0.0) continue;
     const auto place = shading_.place(side, {point.texel, point.triangle});
     emitter.patches.push_back({place.position, place.geometric, area});
@@ -84,30 +90,30 @@ ShadingEmitter LinkedSolver::emitterOf(const NodePlace& node) const {
   return emitter;
 }
 
-ShadingEmitter LinkedSolver::emitterOf(const Shooter& shooter) const {
-  if (shooter.light != scene::kNone) return solver::emitterOf(lights_[shooter.light]);
-  if (shooter.source != scene::kNone) return solver::emitterOf(sources_[shooter.source]);
-  if (shooter.crowd != scene::kNone) return solver::emitterOf(crowds_[shooter.crowd]);
+ShadingEmitter ShadedLight::emitterOf(const Shooter& shooter, const ShootersAndLights& from) const {
+  if (shooter.light != scene::kNone) return solver::emitterOf(from.lights[shooter.light]);
+  if (shooter.source != scene::kNone) return solver::emitterOf(from.sources[shooter.source]);
+  if (shooter.crowd != scene::kNone) return solver::emitterOf(from.crowds[shooter.crowd]);
   return emitterOf(shooter.place);
 }
 
 /// Adds what light over links, as it was last solved for, is more for the shading normals. By side, so that the sums do
 /// not depend on who makes them.
-void LinkedSolver::addShadedLinks(LinkSystem::From from, ShadedLight& light) const {
+void ShadedLight::addLinks(const ShootersAndLights& from, LinkSystem::From which, Values& values) const {
   struct Sender {
     const Shooter* shooter;
     ShadingEmitter emitter;
     std::array<glm::vec3, 2> sent;
   };
   std::vector<Sender> senders;
-  for (const auto& shooter : system_.shooters()) {
-    if (from == LinkSystem::From::kLights && !shooter.isLight()) continue;
+  for (const auto& shooter : from.system.shooters()) {
+    if (which == LinkSystem::From::kLights && !shooter.isLight()) continue;
     const auto sentBy = [&](std::size_t half) {
       return static_cast<float>(shooter.carried(half)) * shooter.sent[half];
     };
     const std::array<glm::vec3, 2> sent{sentBy(0), sentBy(1)};
     if (sent[0] != glm::vec3(0.0F) || sent[1] != glm::vec3(0.0F))
-      senders.push_back({&shooter, emitterOf(shooter), sent});
+      senders.push_back({&shooter, emitterOf(shooter, from), sent});
   }
   const auto shadeSide = [&](std::size_t part) {
     const auto& shaded = shading_.sides()[part];
@@ -125,16 +131,16 @@ void LinkedSolver::addShadedLinks(LinkSystem::From from, ShadedLight& light) con
         std::array<ShadedPlace, LeafShading::kMostPlaces> places;
         const auto count = shading_.places(side, leaf, places);
         const auto more = static_cast<float>(shadedPart(emitter, std::span(places).first(count)) - 1.0);
-        for (std::size_t half = 0; half < 2; ++half) light[half][number] += more * link[half][leaf] * sent[half];
+        for (std::size_t half = 0; half < 2; ++half) values[half][number] += more * link[half][leaf] * sent[half];
       }
     }
   };
   inTurns(shading_.sides().size(), shadeSide);
 }
 
-/// By number: what smoothing made of the leaf's light.
-void LinkedSolver::shadedFactors(const DirectSmoothing::Halves& raw, const DirectSmoothing::Halves& smooth,
-                                 ShadedLight& factors) const {
+ShadedLight::Values ShadedLight::factors(const DirectSmoothing::Halves& raw,
+                                         const DirectSmoothing::Halves& smooth) const {
+  Values factors;
   for (std::size_t half = 0; half < 2; ++half) {
     factors[half].assign(shading_.size(), glm::vec3(1.0F));
     for (const auto& shaded : shading_.sides()) {
@@ -147,35 +153,43 @@ void LinkedSolver::shadedFactors(const DirectSmoothing::Halves& raw, const Direc
       }
     }
   }
+  return factors;
 }
 
-void LinkedSolver::scaleShaded(const ShadedLight& factors, ShadedLight& light) {
+void ShadedLight::scale(const Values& factors, Values& values) {
   for (std::size_t half = 0; half < 2; ++half)
-    for (std::size_t number = 0; number < factors[half].size(); ++number) light[half][number] *= factors[half][number];
+    for (std::size_t number = 0; number < factors[half].size(); ++number) values[half][number] *= factors[half][number];
 }
 
-/// Before what rays brought is forgotten.
-void LinkedSolver::shadeLeaves() {
+void ShadedLight::update(const ShootersAndLights& from, const LeafGather* gather) {
   if (shading_.empty()) return;
-  for (auto& half : shaded_) half.assign(shading_.size(), glm::vec3(0.0F));
-  addShadedLinks(LinkSystem::From::kAll, shaded_);
-  scaleShaded(std::exchange(shaded_factors_, {}), shaded_);
-  if (!gather_) return;
+  values_ = zeros();
+  addLinks(from, LinkSystem::From::kAll, values_);
+  scale(std::exchange(next_factors_, {}), values_);
+  if (gather == nullptr) return;
   for (const auto& shaded : shading_.sides()) {
     const Side& side = sides_[shaded.side];
     for (std::size_t half = 0; half < 2; ++half) {
-      const auto gathered = gather_->irradiance(half), parts = gather_->shadedParts(half);
+      const auto gathered = gather->irradiance(half), parts = gather->shadedParts(half);
       for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-        shaded_[half][shaded.first + leaf] += (parts[shaded.first + leaf] - 1.0F) * gathered[side.first_value + leaf];
+        values_[half][shaded.first + leaf] += (parts[shaded.first + leaf] - 1.0F) * gathered[side.first_value + leaf];
     }
   }
 }
 
-/// What a leaf lacks of its light is for the shading normal in proportion.
-glm::vec3 LinkedSolver::shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const {
+void ShadedLight::addDirectTo(const ShootersAndLights& from, const Values& factors,
+                              std::vector<glm::vec3>& nodes) const {
+  if (shading_.empty()) return;
+  auto direct = zeros();
+  addLinks(from, LinkSystem::From::kLights, direct);
+  scale(factors, direct);
+  add(direct, kBothHalves, nodes);
+}
+
+glm::vec3 ShadedLight::correction(std::uint32_t value, const glm::vec3& light, const glm::vec3& lacks) const {
   const auto number = shading_.empty() ? scene::kNone : shading_.numberOf(value);
   if (number == scene::kNone) return lacks;
-  const glm::vec3 light = lightOf(value), more = 0.5F * (shaded_[0][number] + shaded_[1][number]);
+  const glm::vec3 more = 0.5F * (values_[0][number] + values_[1][number]);
   glm::vec3 factor(1.0F);
   for (int c = 0; c < 3; ++c) {
     if (light[c] > 0.0F) factor[c] = std::clamp(1.0F + more[c] / light[c], 0.0F, kMostFactor);
@@ -183,16 +197,15 @@ glm::vec3 LinkedSolver::shadedCorrection(std::uint32_t value, const glm::vec3& l
   return factor * lacks;
 }
 
-/// To values by node: of this half, or the mean of both (kBothHalves).
-void LinkedSolver::addShaded(const ShadedLight& light, std::uint32_t half, std::vector<glm::vec3>& nodes) const {
+void ShadedLight::add(const Values& values, std::uint32_t half, std::vector<glm::vec3>& nodes) const {
   for (const auto& shaded : shading_.sides()) {
     const Side& side = sides_[shaded.side];
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto number = shaded.first + leaf;
       if (shading_.normal(number) == glm::vec3(0.0F)) continue;
+      const auto more = half == kBothHalves ? 0.5F * (values[0][number] + values[1][number]) : values[half][number];
       auto& node = nodes[side.first_node + leaf];
-      node = glm::max(node + (half == kBothHalves ? 0.5F * (light[0][number] + light[1][number]) : light[half][number]),
-                      0.0F);
+      node = glm::max(node + more, 0.0F);
     }
   }
 }
