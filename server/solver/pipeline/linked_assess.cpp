@@ -66,7 +66,7 @@ void LinkedSolver::assess() {
   if (gathers())
     unsolved = std::clamp(std::sqrt(gather_->unsolvedSquare() / field.square()), kLeastUnsolved * unsolved, unsolved);
   error_.residual = (owed + presumed) / (1.0 - kept) / received + system_.unsolved() + unsolved;
-  error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
+  error_.residual = std::hypot(error_.residual, repair_.missing() / std::sqrt(field.square()));  // of links that wait
   error_.total = std::hypot(error_.residual, error_.sampling);
   if (!variation_) return;
   error_.sampling = std::hypot(by_links_, std::sqrt((variation_->noise() + doubt) / field.square()));
@@ -101,6 +101,31 @@ LinkedSolver::FieldSums LinkedSolver::assessField() const {
   return all;
 }
 
+double LinkedSolver::fieldNorm() const {
+  double square = 0.0;
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto light = lightOf(side.first_value + leaf);
+      square += static_cast<double>(patches_->node_area[side.first_node + leaf] * glm::dot(light, light));
+    }
+  }
+  return std::sqrt(square);
+}
+
+/// The stated error without what waits, of which an edit decides anew.
+double LinkedSolver::errorBesideMissing() const {
+  const double norm = fieldNorm(), waits = norm > 0.0 ? repair_.missing() / norm : 0.0;
+  return std::sqrt(std::max(0.0, error_.total * error_.total - waits * waits));
+}
+
+/// After the light was solved for.
+bool LinkedSolver::findsMoreDue() { return repair_.lacksLinks() && repair_.findsMoreDue(fieldNorm()); }
+
+bool LinkedSolver::isDueForTarget() {
+  if (error_.total <= settings_.target_error || !repair_.lacksLinks()) return false;
+  return repair_.isDueForTarget(error_.total, fieldNorm());
+}
+
 /// Without memory or threads the next step will try again, and can say so.
 void LinkedSolver::tryNow(const std::function<void()>& work) {
   try {
@@ -119,17 +144,12 @@ LinkCounters LinkedSolver::linkCounters() const {
   counters.sweeps = sweeps_;
   counters.replayed = replayed_;
   counters.rows = system_.rowCount();
-  counters.kept = edits_.kept;
-  counters.repaired = edits_.repaired;
-  counters.repaired_links = edits_.repaired_links;
-  counters.retaken = edits_.retaken;
-  counters.own_looks = edits_.own_looks;
   if (gather_) {
     counters.bytes += gather_->sights().bytes();
     counters.rays = gather_->rays();
     counters.rays_kept = gather_->sights().kept();
   }
-  for (const auto& repair : std::span(repairs_).subspan(repaired_)) counters.waiting += repair.samples;
+  repair_.addTo(counters);
   std::uint64_t nodes = 0;
   for (const auto& shooter : system_.shooters()) {
     nodes += shooter.isLight() ? 0 : 1;

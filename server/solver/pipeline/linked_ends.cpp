@@ -44,7 +44,7 @@ std::uint64_t LinkedSolver::lightKey() const {
 
 /// What it ended with for this light before, if that reaches the target. False: there is no such end.
 bool LinkedSolver::takeKeptEnd() {
-  if (lacksLinks()) return false;
+  if (repair_.lacksLinks()) return false;
   const auto kept = ends_.find(lightKey());
   if (!kept || !(kept->error.total <= settings_.target_error)) return false;
   half_ = kept->half;
@@ -59,7 +59,7 @@ bool LinkedSolver::takeKeptEnd() {
 /// there is now is kept.
 void LinkedSolver::endHere() {
   phase_ = Phase::kDone;
-  if (takeKeptEnd() || lacksLinks()) return;
+  if (takeKeptEnd() || repair_.lacksLinks()) return;
   auto end = std::make_shared<KeptEnd>();
   end->key = lightKey();
   end->half = half_;

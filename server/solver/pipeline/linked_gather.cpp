@@ -185,16 +185,17 @@ LeftLight LinkedSolver::leftLight() const {
 
 void LinkedSolver::inheritRays(const LinkedSolver& former, const Renumbering& numbers) {
   startRays();
+  const auto& shadows = *repair_.shadows().now;
   std::vector<std::uint32_t> value_before(system_.leafAreas().size(), scene::kNone);
   for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
     if (numbers.unmoved_after[s] == scene::kNone) continue;
     const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto value = side.first_value + leaf;
-      if (!shadows_->change().altered[value]) value_before[value] = before.first_value + leaf;
+      if (!shadows.change().altered[value]) value_before[value] = before.first_value + leaf;
     }
   }
-  gather_->inherit(*former.gather_, value_before, *shadows_);
+  gather_->inherit(*former.gather_, value_before, shadows);
   gather_->start();
 }
 

@@ -37,19 +37,19 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
     : LinkedSolver(std::move(patches), transport, settings) {
   auto numbers = renumber(former, map, keep_former);
   auto change = changeOf(numbers);
-  if (former.lacksLinks()) {
+  if (former.repair_.lacksLinks()) {
     auto all = change;
     addEarlier(numbers, all);
-    earlier_shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(all));
+    repair_.shadows().earlier = std::make_unique<Shadows>(*patches_, sides_, std::move(all));
   }
   std::optional<ChangeReach> reach;
   const auto prepare = [&](std::size_t part) {  // each reads what none of them writes
-    if (part == 0) shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
+    if (part == 0) repair_.shadows().now = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
     if (part == 1) reach.emplace(*former.patches_, *patches_, map);
     if (part == 2 && (former.variation_ || former.gather_)) (void)leafRays();
   };
   inTurns(3, prepare);
-  edits_ = former.edits_;
+  repair_.countFrom(former.repair_);
   counters_ = former.counters_;
   rounds_ = former.rounds_;
   solutions_ = former.solutions_;
@@ -63,8 +63,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   inheritNodes(former, numbers);
   inheritEntries(former, numbers);
-  setPostponed(former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error);
-  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), *reach);
+  repair_.plan(former.isRepairing() ? 0.0 : former.fieldNorm(),
+               former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error, *reach);
   if (former.variation_) inheritVariation(former, numbers);
   if (former.gather_) inheritRays(former, numbers);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
@@ -98,8 +98,7 @@ LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, con
     if (!map.moved[side.surface]) numbers.unmoved_after[old_side] = s;
   }
   numbers.unfinished.resize(former.system_.shooters().size());
-  for (const auto& repair : std::span(former.repairs_).subspan(former.repaired_))
-    numbers.unfinished[repair.shooter][repair.half] = repair;
+  for (const auto& repair : former.repair_.waiting()) numbers.unfinished[repair.shooter][repair.half] = repair;
   return numbers;
 }
 
@@ -117,7 +116,8 @@ GeometryChange LinkedSolver::changeOf(const Renumbering& numbers) const {
 /// Where an edit comes before those before it were taken in, theirs count too.
 void LinkedSolver::addEarlier(const Renumbering& numbers, GeometryChange& change) const {
   const auto& former = numbers.former;
-  const auto& earlier = (former.earlier_shadows_ ? former.earlier_shadows_ : former.shadows_)->change();
+  const auto& shadows = former.repair_.shadows();
+  const auto& earlier = (shadows.earlier ? shadows.earlier : shadows.now)->change();
   change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
   change.came.insert(change.came.end(), earlier.came.begin(), earlier.came.end());
   scene::joinBoxes(change.boxes);
@@ -151,7 +151,7 @@ void LinkedSolver::inheritLights(LinkedSolver& former, Renumbering& numbers) {
 
 void LinkedSolver::inheritNodes(LinkedSolver& former, Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
-  const auto first_repair = repairs_.size();
+  const auto first_repair = repair_.added().size();
   std::vector<std::uint32_t> staying;
   for (const auto& shooter : shooters) {
     if (shooter.isLight() || numbers.side_after[shooter.place.side] == scene::kNone) continue;
@@ -170,7 +170,8 @@ void LinkedSolver::inheritNodes(LinkedSolver& former, Renumbering& numbers) {
     shooter.mean = shooters[n].mean;
     shooter.sent = shooters[n].sent;
     shooter.most_bytes = memory_.mostBytes(shooter.place.side);
-    planRepairsOf(shooters[n], n, system_.add(shooter), isAltered(shooter.place, shadows_->change()), numbers);
+    planRepairsOf(shooters[n], n, system_.add(shooter), isAltered(shooter.place, repair_.shadows().now->change()),
+                  numbers);
   }
   inheritColumns(former, first_repair, numbers);
 }
@@ -202,9 +203,9 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
                                           : column.samples();
     if (samples == 0) continue;
     const bool overtaken = unfinished.samples > 0;
-    const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
-    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken,
-                        overtaken ? unfinished.reach : 0.0});
+    const bool was_altered = overtaken && !is_light && isAltered(shooter.place, repair_.shadows().earlier->change());
+    repair_.add({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken,
+                 overtaken ? unfinished.reach : 0.0});
   }
 }
 
@@ -212,7 +213,8 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
 void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumbering& numbers) {
   next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
   const auto reach = static_cast<float>(std::max(next_variation_->nearest(), former.variation_->nearest()));
-  const auto& change = shadows_->change();
+  const auto& shadows = *repair_.shadows().now;
+  const auto& change = shadows.change();
   std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);
   std::vector<LeafVariation::Tells> tells(change.altered.size(), LeafVariation::Tells::kNothing);
   const auto tell = [&](std::size_t s) {
@@ -222,7 +224,7 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
       const auto value = side.first_value + leaf;
       if (change.altered[value]) continue;
       value_before[value] = before.first_value + leaf;
-      const bool is_near = shadows_->changesWithin(value, reach);
+      const bool is_near = shadows.changesWithin(value, reach);
       tells[value] = is_near ? LeafVariation::Tells::kByWay : LeafVariation::Tells::kAll;
     }
   };
@@ -231,7 +233,7 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
   const bool same_lights = std::ranges::equal(former.lights_, lights_, [](const auto& a, const auto& b) {
     return a.key == b.key && a.corners == b.corners && a.corner_count == b.corner_count;
   });
-  next_variation_->inherit(*former.variation_, value_before, tells, same_lights ? shadows_.get() : nullptr, lights_);
+  next_variation_->inherit(*former.variation_, value_before, tells, same_lights ? &shadows : nullptr, lights_);
 }
 
 /// Of the matrix: rows of nodes that are what they were, and columns whose links went over as they are.
@@ -241,14 +243,14 @@ void LinkedSolver::inheritEntries(const LinkedSolver& former, const Renumbering&
   same.row = numbers.shooter_before;
   same.row.resize(shooters.size(), scene::kNone);
   same.column.fill(same.row);
-  for (const auto& repair : repairs_) {
+  for (const auto& repair : repair_.added()) {
     if (repair.whole) same.column[repair.half][repair.shooter] = scene::kNone;
   }
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (same.row[n] == scene::kNone || shooters[n].isLight()) continue;
     const auto& place = shooters[n].place;
     const auto old_side = former.system_.shooters()[same.row[n]].place.side;
-    if (numbers.unmoved_after[old_side] != place.side || isAltered(place, shadows_->change()))
+    if (numbers.unmoved_after[old_side] != place.side || isAltered(place, repair_.shadows().now->change()))
       same.row[n] = scene::kNone;
   }
   system_.inheritEntries(former.system_, same);
@@ -257,7 +259,7 @@ void LinkedSolver::inheritEntries(const LinkedSolver& former, const Renumbering&
 /// Links of what is not taken again as a whole go over as they are. Both halves at once: most of it is fresh memory.
 void LinkedSolver::inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers) {
   inBothHalves([&](std::size_t half) {
-    for (const auto& repair : std::span(repairs_).subspan(first_repair)) {
+    for (const auto& repair : repair_.added(first_repair)) {
       if (repair.whole || repair.half != half) continue;
       auto& column = former.system_.shooters()[repair.old_shooter].column[half];
       system_.shooters()[repair.shooter].column[half] = column.renumbered(numbers.unmoved_after, former.sides_, sides_);

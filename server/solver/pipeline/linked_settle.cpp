@@ -144,15 +144,7 @@ void LinkedSolver::dropNodes() {
   }
   system_.clear();
   for (const auto& light : lights) (void)system_.add(light);
-  std::vector<Repair> repairs;
-  for (auto repair : std::span(repairs_).subspan(repaired_)) {
-    if (number[repair.shooter] == scene::kNone) continue;
-    repair.shooter = number[repair.shooter];
-    repairs.push_back(repair);
-  }
-  repairs_ = std::move(repairs);
-  repaired_ = 0;
-  due_ = repairs_.size();
+  repair_.renumber(number);
 }
 
 /// What follows is to assess what there is. False: the light is to be solved for again, since there was no room for the

@@ -28,6 +28,12 @@ constexpr double kFirstAim = 0.02, kAimStep = 2.0;
 /// What solves ended with for other light takes so much at most, or a sixteenth of what links may.
 constexpr std::size_t kMostEndBytes = std::size_t{64} << 20U;
 
+SliceLength firstSlice(const scene::PatchScene& patches) {
+  const auto most =
+      std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches.triangles.size()), 2, 16);
+  return {most, std::min(most, kFewestMeasurements)};
+}
+
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
@@ -49,10 +55,12 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       memory_(*patches_, sides_, settings.link_memory / 2),  // rays may take the other half
       unshot_(*patches_),
       planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
+      parts_{*patches_, sides_, lights_, shots_, settings_, system_, expander_, memory_, transport_},
+      repair_(
+          parts_, [this] { return leafRays(); }, firstSlice(*patches_)),
+      slice_(firstSlice(*patches_)),
       shaded_(*patches_, sides_),
       ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
-  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
-  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   aim_ = std::max(settings_.target_error, kFirstAim);
   planner_.setTarget(aim_);
 }
@@ -105,7 +113,7 @@ Result<void> LinkedSolver::measureSlice() {
     return done;
   }
   const auto start = std::chrono::steady_clock::now();
-  auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
+  auto slice = std::span(wanted_).subspan(measured_, std::min(slice_.most, wanted_.size() - measured_));
   slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));
   ShotBatch batch;
   batch.may_be_put_off = true;
@@ -136,16 +144,24 @@ Result<void> LinkedSolver::measureSlice() {
     for (const auto* want : gathered) order.push_back(*want);
     std::ranges::copy(order, slice.begin());
     measured_ += taken;
-    slice_ = std::max<std::size_t>(taken, std::max<std::size_t>(fewest_a_slice_, 1));
+    slice_.most = std::max<std::size_t>(taken, std::max<std::size_t>(slice_.fewest, 1));
     return {};
   }
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ =
+  slice_.most =
       static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6),
-                                          static_cast<double>(fewest_a_slice_), 4096.0));
+                                          static_cast<double>(slice_.fewest), 4096.0));
+  return {};
+}
+
+/// Of what an edit of geometry may have changed.
+Result<void> LinkedSolver::repairSlice() {
+  const auto done = repair_.advance(phase_ == Phase::kDone && from_links_ == FromLinks::kNo);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
   return {};
 }
 
@@ -202,11 +218,12 @@ Result<StepOutcome> LinkedSolver::advance() {
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
     // Nothing else asks for the light over links that were the last to be measured.
-    if (!lacksLinks() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
+    if (!repair_.lacksLinks() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo)
+      from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }
   if (from_links_ == FromLinks::kAfterEdit) {
-    if (lightsAreTooRough()) return StepOutcome::kSlice;
+    if (repair_.lightsAreTooRough()) return StepOutcome::kSlice;
     if (!edit_lights_planned_) {  // what was switched on, or moved: all that follows depends on its light
       memory_.begin(system_);
       wanted_ = planLights();
@@ -223,7 +240,11 @@ Result<StepOutcome> LinkedSolver::advance() {
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (std::exchange(refined_, false)) return chooseNext();
-  if (phase_ == Phase::kDone) return lacksLinks() ? catchUp() : ended();
+  if (phase_ == Phase::kDone) {
+    if (!repair_.lacksLinks()) return ended();
+    repair_.catchUp();
+    return advance();
+  }
   if (!settling_ && measured_ == wanted_.size()) {
     if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
@@ -289,7 +310,7 @@ StepOutcome LinkedSolver::assessed() {
 
 /// What waits may be what is missing.
 StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
-  if (lacksLinks() && !isRepairing()) {
+  if (repair_.lacksLinks() && !isRepairing()) {
     beExact();
     from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;

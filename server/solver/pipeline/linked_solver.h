@@ -14,7 +14,6 @@
 
 #include "common/result.h"
 #include "server/solver/edits/change_reach.h"
-#include "server/solver/edits/shadows.h"
 #include "server/solver/error/field_error.h"
 #include "server/solver/lamps/crowd.h"
 #include "server/solver/links/link_memory.h"
@@ -26,6 +25,7 @@
 #include "server/solver/pipeline/shaded_light.h"
 #include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/reflected/leaf_gather.h"
+#include "server/solver/repair/edit_repair.h"
 #include "server/solver/solver.h"
 #include "server/solver/transport/node_shots.h"
 #include "server/solver/variation/leaf_variation.h"
@@ -59,11 +59,11 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> irradiance() const override;
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
-  [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
+  [[nodiscard]] bool isRepairing() const override { return repair_.isRepairing(); }
   [[nodiscard]] bool isUnsettled() const override { return from_links_ == FromLinks::kAfterEdit; }
   /// When all links are there, the light over them is still to be solved for.
   [[nodiscard]] bool isBehind() const override {
-    return lacksLinks() ||
+    return repair_.lacksLinks() ||
            (phase_ == Phase::kDone && (from_links_ == FromLinks::kToConfirm || assessing_ != Assessed::kNothing));
   }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
@@ -77,7 +77,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }
   [[nodiscard]] SolveLimit limit() const override { return limit_; }
   [[nodiscard]] LinkCounters linkCounters() const override;
-  [[nodiscard]] std::uint64_t affectedSamples() const override { return affected_; }
+  [[nodiscard]] std::uint64_t affectedSamples() const override { return repair_.affectedSamples(); }
   [[nodiscard]] bool hasFluxScale() const override { return false; }
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
@@ -85,7 +85,7 @@ class LinkedSolver final : public Solver {
   /// Whether there is memory for the rays of a scene.
   [[nodiscard]] static bool mayGather(const scene::PatchScene& patches, const SolverSettings& settings);
   /// After an edit of geometry: no light before all links are true.
-  void beExact();
+  void beExact() { repair_.beExact(); }
   /// What the links of all lights can come to take.
   [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
@@ -107,35 +107,6 @@ class LinkedSolver final : public Solver {
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self);
-  /// Samples of a column that are to be taken again.
-  struct LeafLink {
-    std::uint32_t value;
-    float link;
-  };
-  struct Repair {
-    std::uint32_t shooter = 0, old_shooter = 0;
-    std::size_t half = 0;
-    std::uint32_t samples = 0;  ///< of a light polygon: points
-    bool whole = false;         ///< all their links; the column is empty
-    bool overtaken = false;     ///< nor were they taken again after the edit before
-    double reach = HUGE_VAL;    ///< what the old links are wrong by (ChangeReach); infinite: cannot wait
-    // Of a light, of which some points look first and stand for all of them:
-    std::uint32_t first_shots = 0;  ///< those that shall have looked next; 0: as many as look first
-    std::uint32_t looked = 0;       ///< points that have
-    LinkColumn::Totals found = {};  ///< by them, times points
-    double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many;
-                                    ///< what all points would leave of it counts by what share of them has looked
-    std::vector<LeafLink> by_points = {};  ///< ascending: of leaves that looked at it for themselves, by points alone
-    bool past_losses = false;              ///< its looks see where the change is alone, whatever is lost elsewhere
-
-    /// As if none had looked.
-    void lookAnew() {
-      looked = 0;
-      found = {};
-      past_losses = false;
-      by_points.clear();
-    }
-  };
   /// Where the sides of the scene before are now.
   struct Renumbering {
     const LinkedSolver& former;
@@ -145,12 +116,6 @@ class LinkedSolver final : public Solver {
     std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
     std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
     std::vector<std::uint32_t> shooter_before;      ///< by shooter; it may be shorter
-  };
-  struct RepairBatch;
-  /// A leaf that looks at a light for itself.
-  struct LeafLook {
-    std::uint32_t value;
-    std::array<std::optional<float>, 2> link;  ///< by half, where it can
   };
 
   /// All but its light.
@@ -166,49 +131,11 @@ class LinkedSolver final : public Solver {
   void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
                      Renumbering& numbers);
   void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
-  void planRepairs(double norm, const ChangeReach& change);
-  [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
-    return repair.overtaken ? *earlier_shadows_ : *shadows_;
-  }
-  [[nodiscard]] double reachOf(const Repair& repair, const ChangeReach& change) const;
-  [[nodiscard]] double missing(const Repair& repair) const;
-  [[nodiscard]] double missing() const;
-  /// After an edit of geometry, some are still those of before.
-  [[nodiscard]] bool lacksLinks() const { return repaired_ < repairs_.size(); }
   [[nodiscard]] double errorBesideMissing() const;
   [[nodiscard]] double fieldNorm() const;
-  void planDue(double norm);
-  void setPostponed(double error);
   [[nodiscard]] bool findsMoreDue();
   [[nodiscard]] bool isDueForTarget();
-  struct ShotRange {
-    std::uint32_t first, end;
-  };
-  [[nodiscard]] ShotRange shotsOfLight(const Repair& repair) const;
-  [[nodiscard]] std::vector<float> noiseOfLeaves(std::uint32_t shooter,
-                                                 std::span<const LinkColumn::ValueRun> leaves) const;
-  void weighRough(RepairBatch& batch);
-  [[nodiscard]] bool mayLookFromLeaves() const;
-  void lookFromLeaves(std::array<Repair*, 2> halves, std::span<const LinkColumn::ValueRun> leaves,
-                      std::span<float> room);
-  [[nodiscard]] std::vector<LeafLook> chooseUnsure(std::span<const LinkColumn::ValueRun> leaves,
-                                                   std::span<const float> noise, double wanted,
-                                                   std::span<float> room) const;
-  void takeLeafLooks(Repair& repair, std::span<const LinkColumn::ValueRun> leaves, std::span<const LeafLook> looks,
-                     std::span<float> room);
-  [[nodiscard]] double mostRoughness() const;
-  [[nodiscard]] bool lightsAreTooRough();
-  [[nodiscard]] Result<StepOutcome> catchUp();
-  [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
-  [[nodiscard]] bool isNeeded(Repair& repair);
-  void addSamples(const Repair& repair, ShotBatch& batch) const;
-  [[nodiscard]] bool losesLittle(const Repair& repair) const;
-  void findCutLinks(RepairBatch& repairs) const;
-  void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
-  void replacePart(RepairBatch& repairs, std::uint32_t index);
   [[nodiscard]] Result<void> repairSlice();
-  void takeRepairs(RepairBatch& batch);
-  void addShots(RepairBatch& batch);
   /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
   [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
   [[nodiscard]] std::vector<Measurement> plan();
@@ -343,22 +270,11 @@ class LinkedSolver final : public Solver {
   LinkPlanner planner_;
   std::shared_ptr<const LeafRays> leaf_rays_;  // of rays and paths; null: not asked for yet
   std::unique_ptr<LeafGather> gather_;         // of reflected light; null: lights, and what is bright, are not measured
-  double sampled_alone_ = 0.0;        // error before the last round that brought samples and no rays; 0: none did
-  double sample_goal_ = 0.0;          // sampling error that further samples of links shall reach; 0: none
-  std::vector<Repair> repairs_;       // after an edit of geometry
-  std::size_t repaired_ = 0;          // of these
-  std::size_t due_ = 0;               // of these, before anything else is done
-  double repair_shot_seconds_ = 0.0;  // as the last of them took; 0: not known
-  double postponed_ = 0.0;            // part of the target error that the others may cause
-  double roughness_ = 0.0;            // likewise: lights that look again with some points only
-  bool lights_may_be_rough_ = true;   // that they may
-  bool may_look_past_ = true;         // of what is lost, little that is lost elsewhere need not be seen again
-  double norm_before_ = 0.0;          // of irradiance before the edit; 0: not known
-  std::unique_ptr<Shadows> shadows_;  // of the edit
-  std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
+  double sampled_alone_ = 0.0;  // error before the last round that brought samples and no rays; 0: none did
+  double sample_goal_ = 0.0;    // sampling error that further samples of links shall reach; 0: none
+  LinkParts parts_;             // views of these
+  EditRepair repair_;           // of links that an edit of geometry may have changed
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
-  std::uint64_t affected_ = 0;
-  LinkCounters edits_;  // what repairs add to linkCounters()
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;
   bool lights_fit_ = true;  // no light goes without links for want of memory
@@ -371,8 +287,7 @@ class LinkedSolver final : public Solver {
   std::size_t measured_ = 0;          // of the wave
   bool in_haste_ = false;             // its time is over
   std::vector<Measurement> rough_;    // what it measured of crowds in haste
-  std::size_t slice_ = 16;            // measurements that take some 50 ms
-  std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
+  SliceLength slice_;                 // in measurements
   bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
   double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
   std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;

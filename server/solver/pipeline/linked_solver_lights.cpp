@@ -173,8 +173,7 @@ void LinkedSolver::addSource(const PunctualLights::Source& source) {
 /// Unknown while links of a light are still to be measured, or measured again.
 std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   const auto& shooters = system_.shooters();
-  const auto isOld = [&](const Repair& repair) { return shooters[repair.shooter].isLight() && repair.looked == 0; };
-  if (std::ranges::any_of(std::span(repairs_).subspan(repaired_), isOld)) return {};
+  if (!repair_.knowsLights()) return {};
   if (std::ranges::any_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) return {};
   std::array<std::vector<glm::vec3>, 2> halves;
   inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
