@@ -68,9 +68,9 @@ void LinkedSolver::assess() {
   error_.residual = (owed + presumed) / (1.0 - kept) / received + system_.unsolved() + unsolved;
   error_.residual = std::hypot(error_.residual, repair_.missing() / std::sqrt(field.square()));  // of links that wait
   error_.total = std::hypot(error_.residual, error_.sampling);
-  if (!variation_) return;
-  error_.sampling = std::hypot(by_links_, std::sqrt((variation_->noise() + doubt) / field.square()));
-  error_.variation = std::sqrt(variation_->left() / field.square());
+  if (!variation_.isTraced()) return;
+  error_.sampling = std::hypot(by_links_, std::sqrt((variation_.noise() + doubt) / field.square()));
+  error_.variation = std::sqrt(variation_.left() / field.square());
   error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
 }
 

@@ -72,8 +72,7 @@ void LinkedSolver::endHere() {
 }
 
 std::span<const LeafVariation::Correction> LinkedSolver::corrections() const {
-  if (shown_) return shown_->corrections;
-  return variation_ ? variation_->corrections() : std::span<const LeafVariation::Correction>();
+  return shown_ ? shown_->corrections : variation_.corrections();
 }
 
 }  // namespace radiosity::solver

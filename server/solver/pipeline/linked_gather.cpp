@@ -183,19 +183,9 @@ LeftLight LinkedSolver::leftLight() const {
   return light;
 }
 
-void LinkedSolver::inheritRays(const LinkedSolver& former, const Renumbering& numbers) {
+void LinkedSolver::inheritRays(const LinkedSolver& former, std::span<const std::uint32_t> value_before) {
   startRays();
-  const auto& shadows = *repair_.shadows().now;
-  std::vector<std::uint32_t> value_before(system_.leafAreas().size(), scene::kNone);
-  for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
-    if (numbers.unmoved_after[s] == scene::kNone) continue;
-    const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto value = side.first_value + leaf;
-      if (!shadows.change().altered[value]) value_before[value] = before.first_value + leaf;
-    }
-  }
-  gather_->inherit(*former.gather_, value_before, shadows);
+  gather_->inherit(*former.gather_, value_before, *repair_.shadows().now);
   gather_->start();
 }
 

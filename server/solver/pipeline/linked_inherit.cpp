@@ -46,7 +46,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   const auto prepare = [&](std::size_t part) {  // each reads what none of them writes
     if (part == 0) repair_.shadows().now = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
     if (part == 1) reach.emplace(*former.patches_, *patches_, map);
-    if (part == 2 && (former.variation_ || former.gather_)) (void)leafRays();
+    if (part == 2 && (former.variation_.isTraced() || former.gather_)) (void)leafRays();
   };
   inTurns(3, prepare);
   repair_.countFrom(former.repair_);
@@ -65,8 +65,9 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   inheritEntries(former, numbers);
   repair_.plan(former.isRepairing() ? 0.0 : former.fieldNorm(),
                former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error, *reach);
-  if (former.variation_) inheritVariation(former, numbers);
-  if (former.gather_) inheritRays(former, numbers);
+  const auto value_before = unalteredBefore(numbers);
+  if (former.variation_.isTraced()) inheritVariation(former, value_before);
+  if (former.gather_) inheritRays(former, value_before);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
@@ -209,31 +210,26 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
   }
 }
 
-/// Where nothing changed near a leaf, what its paths meet there is what they met.
-void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumbering& numbers) {
-  next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
-  const auto reach = static_cast<float>(std::max(next_variation_->nearest(), former.variation_->nearest()));
-  const auto& shadows = *repair_.shadows().now;
-  const auto& change = shadows.change();
-  std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);
-  std::vector<LeafVariation::Tells> tells(change.altered.size(), LeafVariation::Tells::kNothing);
-  const auto tell = [&](std::size_t s) {
-    if (numbers.unmoved_after[s] == scene::kNone) return;
-    const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto value = side.first_value + leaf;
-      if (change.altered[value]) continue;
-      value_before[value] = before.first_value + leaf;
-      const bool is_near = shadows.changesWithin(value, reach);
-      tells[value] = is_near ? LeafVariation::Tells::kByWay : LeafVariation::Tells::kAll;
-    }
-  };
-  inTurns(former.sides_.size(), tell, change.altered.size() / kLeavesAThread);
+/// By leaf value: that before the edit, or kNone where the leaf is another, or elsewhere.
+std::vector<std::uint32_t> LinkedSolver::unalteredBefore(const Renumbering& numbers) const {
+  const auto& altered = repair_.shadows().now->change().altered;
+  std::vector<std::uint32_t> value_before(altered.size(), scene::kNone);
+  const auto& sides = numbers.former.sides_;
+  for (std::size_t s = 0; s < sides.size(); ++s) {
+    if (numbers.unmoved_after[s] == scene::kNone) continue;
+    const auto first = sides_[numbers.unmoved_after[s]].first_value;
+    for (std::uint32_t leaf = 0; leaf < sides[s].leaf_count; ++leaf)
+      if (!altered[first + leaf]) value_before[first + leaf] = sides[s].first_value + leaf;
+  }
+  return value_before;
+}
+
+void LinkedSolver::inheritVariation(const LinkedSolver& former, std::span<const std::uint32_t> value_before) {
   // Lamps that moved come after those that did not.
   const bool same_lights = std::ranges::equal(former.lights_, lights_, [](const auto& a, const auto& b) {
     return a.key == b.key && a.corners == b.corners && a.corner_count == b.corner_count;
   });
-  next_variation_->inherit(*former.variation_, value_before, tells, same_lights ? &shadows : nullptr, lights_);
+  variation_.inherit(former.variation_, value_before, *repair_.shadows().now, same_lights, lights_);
 }
 
 /// Of the matrix: rows of nodes that are what they were, and columns whose links went over as they are.

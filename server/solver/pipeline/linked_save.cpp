@@ -103,8 +103,7 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   system_.save(to);
   to(gather_ != nullptr);
   if (gather_) gather_->save(to);
-  to(variation_ != nullptr);
-  if (variation_) LeafVariation::visit(to, *variation_);
+  variation_.save(to);
   return true;
 }
 
@@ -167,16 +166,9 @@ bool LinkedSolver::restore(ArchiveReader& from) {
     startRays();
     if (!gather_->restore(from)) return false;
   }
-  bool varies = false;
-  from(varies);
-  if (varies) {
-    variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
-    LeafVariation::visit(from, *variation_);
-    if (!variation_->isWhole()) return false;
-  }
-  if (!from.ok()) return false;
+  if (!variation_.restore(from) || !from.ok()) return false;
   findUnshot();
-  if (variation_) updateVariation();
+  updateVariation();
   return true;
 }
 

@@ -79,7 +79,7 @@ bool LinkedSolver::lightLeaves() {
   if (gather_) gather_->forgetIrradiance();
   pass_ = Pass::kNone;
   findUnshot();
-  if (variation_) updateVariation();
+  updateVariation();
   return true;
 }
 
@@ -125,7 +125,8 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
-  refined_ = is_confirmed_ = is_tracing_ = false;
+  refined_ = is_confirmed_ = false;
+  variation_.stopTracing();
   assessing_ = Assessed::kNothing;
   edit_lights_planned_ = false;
   error_ = {};  // unknown

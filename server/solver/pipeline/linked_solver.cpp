@@ -60,6 +60,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
           parts_, [this] { return leafRays(); }, firstSlice(*patches_)),
       slice_(firstSlice(*patches_)),
       shaded_(*patches_, sides_),
+      variation_(*patches_, sides_, settings_.seed, [this] { return leafRays(); }),
       ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
   aim_ = std::max(settings_.target_error, kFirstAim);
   planner_.setTarget(aim_);
@@ -200,14 +201,14 @@ Result<StepOutcome> LinkedSolver::step() {
   } catch (const std::bad_alloc&) {
     pass_ = Pass::kNone;  // what was half done is begun anew
     assessing_ = Assessed::kNothing;
-    is_tracing_ = false;
+    variation_.stopTracing();
     return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
                                           " shooters and " + std::to_string(system_.bytes() >> 20U) +
                                           " MiB of links; fewer texels, or a larger error, need less");
   } catch (const std::system_error& error) {
     pass_ = Pass::kNone;
     assessing_ = Assessed::kNothing;
-    is_tracing_ = false;
+    variation_.stopTracing();
     return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
   }
 }
@@ -348,7 +349,7 @@ bool LinkedSolver::aimFurther() {
   if (aim_ <= settings_.target_error) return false;
   aim_ = std::max(aim_ / kAimStep, settings_.target_error);
   planner_.setTarget(aim_);
-  if (!variation_) return true;
+  if (!variation_.isTraced()) return true;
   updateVariation();
   assess();
   return true;
@@ -382,7 +383,7 @@ void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);
-  if (variation_) tryNow([this] { updateVariation(); });
+  tryNow([this] { updateVariation(); });
   if (assessing_ != Assessed::kNothing) return;  // which is for this target
   if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
       error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it

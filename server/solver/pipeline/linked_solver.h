@@ -10,6 +10,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/result.h"
@@ -28,7 +29,7 @@
 #include "server/solver/repair/edit_repair.h"
 #include "server/solver/solver.h"
 #include "server/solver/transport/node_shots.h"
-#include "server/solver/variation/leaf_variation.h"
+#include "server/solver/variation/variation_stage.h"
 
 namespace radiosity::solver {
 
@@ -127,7 +128,8 @@ class LinkedSolver final : public Solver {
   void inheritLights(LinkedSolver& former, Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, Renumbering& numbers);
   void inheritEntries(const LinkedSolver& former, const Renumbering& numbers);
-  void inheritVariation(const LinkedSolver& former, const Renumbering& numbers);
+  [[nodiscard]] std::vector<std::uint32_t> unalteredBefore(const Renumbering& numbers) const;
+  void inheritVariation(const LinkedSolver& former, std::span<const std::uint32_t> value_before);
   void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
                      Renumbering& numbers);
   void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
@@ -210,7 +212,7 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] FieldSums assessField() const;
   void updateVariation();
-  [[nodiscard]] bool updateVariation(LeafVariation& variation, double seconds);
+  [[nodiscard]] bool withLeafLight(const std::function<bool(const LeafLight&)>& work) const;
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();
   [[nodiscard]] double targetOfLinks() const;
@@ -233,7 +235,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
   [[nodiscard]] std::shared_ptr<const LeafRays> leafRays();
-  void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
+  void inheritRays(const LinkedSolver& former, std::span<const std::uint32_t> value_before);
   [[nodiscard]] StepOutcome chooseRays();
   [[nodiscard]] bool refineBlotches();
   [[nodiscard]] double blotch() const;
@@ -298,12 +300,9 @@ class LinkedSolver final : public Solver {
   ShadedLight shaded_;                          // to be added to half_ where it is told
   DirectSmoothing direct_smoothing_;
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
-  std::unique_ptr<LeafVariation> variation_;          // once little else is in error
-  std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then
-  bool is_tracing_ = false;                           // its paths, in slices
+  VariationStage variation_;                          // once little else is in error
   Assessed assessing_ = Assessed::kNothing;
   bool refined_ = false;   // more paths were traced: what is next is to be chosen anew
-  double square_ = 0.0;    // of the light that it was brought up to date with, times area
   double by_links_ = 0.0;  // sampling error without the noise of that
   ErrorParts error_;
   KeptEnds ends_;
