@@ -69,8 +69,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                            Transport& transport, const SolverSettings& settings, const LightSources& sources)
     : LinkedSolver(std::move(patches), transport, settings) {
-  key_end_ = static_cast<std::uint32_t>(patches_->nodeCount());
-  triangle_key_end_ = static_cast<std::uint32_t>(patches_->triangles.size());
+  key_ends_ = {static_cast<std::uint32_t>(patches_->nodeCount()),
+               static_cast<std::uint32_t>(patches_->triangles.size())};
   takeMaterials(materials);
   takeSources(sources);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));

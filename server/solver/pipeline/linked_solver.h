@@ -27,6 +27,7 @@
 #include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/reflected/leaf_gather.h"
 #include "server/solver/repair/edit_repair.h"
+#include "server/solver/repair/link_inheritance.h"
 #include "server/solver/solver.h"
 #include "server/solver/transport/node_shots.h"
 #include "server/solver/variation/variation_stage.h"
@@ -108,31 +109,12 @@ class LinkedSolver final : public Solver {
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self);
-  /// Where the sides of the scene before are now.
-  struct Renumbering {
-    const LinkedSolver& former;
-    const scene::PatchMap& map;
-    bool keep_former;
-    std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
-    std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
-    std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
-    std::vector<std::uint32_t> shooter_before;      ///< by shooter; it may be shorter
-  };
-
   /// All but its light.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
-  [[nodiscard]] Renumbering renumber(const LinkedSolver& former, const scene::PatchMap& map, bool keep_former);
-  [[nodiscard]] GeometryChange changeOf(const Renumbering& numbers) const;
-  void addEarlier(const Renumbering& numbers, GeometryChange& change) const;
-  [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
-  void inheritLights(LinkedSolver& former, Renumbering& numbers);
-  void inheritNodes(LinkedSolver& former, Renumbering& numbers);
-  void inheritEntries(const LinkedSolver& former, const Renumbering& numbers);
-  [[nodiscard]] std::vector<std::uint32_t> unalteredBefore(const Renumbering& numbers) const;
+  [[nodiscard]] ChangeReach prepareRepair(const LinkedSolver& former, const LinkInheritance& links,
+                                          const scene::PatchMap& map);
+  void takeCounts(const LinkedSolver& former);
   void inheritVariation(const LinkedSolver& former, std::span<const std::uint32_t> value_before);
-  void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                     Renumbering& numbers);
-  void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
   [[nodiscard]] double errorBesideMissing() const;
   [[nodiscard]] double fieldNorm() const;
   [[nodiscard]] bool findsMoreDue();
@@ -276,7 +258,7 @@ class LinkedSolver final : public Solver {
   double sample_goal_ = 0.0;    // sampling error that further samples of links shall reach; 0: none
   LinkParts parts_;             // views of these
   EditRepair repair_;           // of links that an edit of geometry may have changed
-  std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
+  KeyEnds key_ends_;
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;
   bool lights_fit_ = true;  // no light goes without links for want of memory
