@@ -8,6 +8,7 @@
 #include "server/solver/pipeline/linked_solver.h"
 
 namespace radiosity::solver {
+
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                            Transport& transport, const SolverSettings& settings, const LightSources& sources,
                            LinkedSolver& former, const scene::PatchMap& map, bool keep_former)

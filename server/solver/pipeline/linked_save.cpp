@@ -84,9 +84,10 @@ bool LinkSystem::restore(ArchiveReader& from) {
 template <typename Archive, typename Self>
 void LinkedSolver::visit(Archive& archive, Self& self) {
   archive(self.lights_, self.sources_, self.sky_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
-          self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.rounds_,
-          self.solutions_, self.sweeps_, self.replayed_, self.half_, self.refined_, self.by_links_, self.error_,
-          self.counters_, self.sample_goal_, self.aim_, self.sampled_alone_, self.in_haste_, self.rough_);
+          self.edit_lights_planned_, self.settling_, self.growing_, self.rounds_, self.solutions_, self.sweeps_,
+          self.replayed_, self.half_, self.refined_, self.by_links_, self.error_, self.counters_, self.sample_goal_,
+          self.aim_, self.sampled_alone_);
+  LinkWave::visit(archive, self.wave_);
   ShadedLight::visit(archive, self.shaded_);
   DirectSmoothing::visit(archive, self.direct_smoothing_);
   LinkPlanner::visit(archive, self.planner_);
@@ -155,10 +156,8 @@ bool LinkedSolver::restore(ArchiveReader& from) {
            (shooter.source == scene::kNone || shooter.source < sources_.size()) &&
            (shooter.crowd == scene::kNone || (shooter.crowd < crowds_.size() && shooter.sample_cost > 0.0));
   };
-  const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
-  if (half_[0].size() != values || half_[1].size() != values || !shaded_.isWhole() || measured_ > wanted_.size() ||
-      !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists) ||
-      !std::all_of(rough_.begin(), rough_.end(), exists) || !direct_smoothing_.fits(values))
+  if (half_[0].size() != values || half_[1].size() != values || !shaded_.isWhole() || !wave_.fits() ||
+      !std::all_of(shooters.begin(), shooters.end(), known) || !direct_smoothing_.fits(values))
     return false;
   bool gathers = false;
   from(gathers);

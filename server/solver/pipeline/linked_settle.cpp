@@ -120,8 +120,7 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, U
 void LinkedSolver::solveAnew() {
   if (memory_.isMostlyRows(system_)) dropNodes();
   rounds_before_edit_ = rounds_;
-  wanted_.clear();
-  measured_ = 0;
+  wave_.clear();
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
@@ -151,8 +150,7 @@ void LinkedSolver::dropNodes() {
 /// What follows is to assess what there is. False: the light is to be solved for again, since there was no room for the
 /// links of a new lamp and others had to go, or after more repairs (isRepairing).
 bool LinkedSolver::finishEdit() {
-  wanted_.clear();
-  measured_ = 0;
+  wave_.clear();
   memory_.begin(system_);
   bool forgot = false;
   while (memory_.isOverdrawn() && forgetWeakest()) forgot = true;
@@ -169,9 +167,9 @@ bool LinkedSolver::finishEdit() {
     {
       const AllUnshot all(*this);
       startGrowth();
-      wanted_ = plan();
+      wave_.begin(plan());
     }
-    growing_ = !wanted_.empty() && (wantsLamp() || !mayGoWithout());
+    growing_ = !wave_.wanted().empty() && (wantsLamp() || !mayGoWithout());
   }
   return true;
 }
@@ -179,17 +177,17 @@ bool LinkedSolver::finishEdit() {
 /// False: as finishEdit().
 bool LinkedSolver::choosesAfterEdit() {
   if (isDueForTarget()) {
-    wanted_.clear();
+    wave_.clear();
     from_links_ = FromLinks::kAfterEdit;
     return false;
   }
   if (takeKeptEnd()) {
-    wanted_.clear();
+    wave_.clear();
     return true;
   }
   const bool lacks_lamp = growing_ && wantsLamp();
   if (error_.total <= settings_.target_error && !lacks_lamp) {
-    wanted_.clear();
+    wave_.clear();
     endHere();
   } else if (!growing_) {
     ++rounds_;
@@ -201,7 +199,7 @@ bool LinkedSolver::choosesAfterEdit() {
 /// What shines by itself and is small: rays may not find it at all, and then do not tell that they did not.
 bool LinkedSolver::wantsLamp() const {
   if (!gathers()) return false;
-  return std::ranges::any_of(wanted_, [&](const Measurement& want) {
+  return std::ranges::any_of(wave_.wanted(), [&](const Measurement& want) {
     const auto& shooter = system_.shooters()[want.shooter];
     return !shooter.isLight() && sideShines(shooter.place.side);
   });
@@ -210,7 +208,8 @@ bool LinkedSolver::wantsLamp() const {
 /// After an edit some node or other is just strong enough to be a shooter now. Where the target is reached while the
 /// few that are wanted send nothing, which counts as light that is missing, they are not worth another wave.
 bool LinkedSolver::mayGoWithout() {
-  if (wanted_.size() >= settings_.planner.pairs_a_wave) return false;  // the walk may have ended before it was through
+  if (wave_.wanted().size() >= settings_.planner.pairs_a_wave)
+    return false;  // the walk may have ended before it was through
   growing_ = false;
   assess();
   return error_.total <= settings_.target_error;

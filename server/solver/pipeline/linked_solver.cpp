@@ -58,7 +58,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       parts_{*patches_, sides_, lights_, shots_, settings_, system_, expander_, memory_, transport_},
       repair_(
           parts_, [this] { return leafRays(); }, firstSlice(*patches_)),
-      slice_(firstSlice(*patches_)),
+      wave_(
+          parts_, {punctual_, sources_, crowds_}, [this] { return leafRays(); }, firstSlice(*patches_)),
       shaded_(*patches_, sides_),
       variation_(*patches_, sides_, settings_.seed, [this] { return leafRays(); }),
       ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
@@ -96,66 +97,6 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
     }
   }
   planner_.setReflectance(area > 0.0 ? std::max({reflectance.x, reflectance.y, reflectance.z}) / area : 0.0);
-}
-
-/// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
-/// Where the cuts lie, which depends on time, changes no bit.
-Result<void> LinkedSolver::measureSlice() {
-  const auto isSource = [&](const Measurement& want) { return system_.shooters()[want.shooter].sample_cost > 0.0; };
-  if (isSource(wanted_[measured_])) {
-    const auto& want = wanted_[measured_];
-    if (system_.shooters()[want.shooter].crowd != scene::kNone) {
-      if (measureCrowd(want)) ++measured_;
-      return {};
-    }
-    const auto done = measureSource(want);
-    if (!done && done.error().code == ErrorCode::kCancelled) return {};
-    ++measured_;
-    return done;
-  }
-  const auto start = std::chrono::steady_clock::now();
-  auto slice = std::span(wanted_).subspan(measured_, std::min(slice_.most, wanted_.size() - measured_));
-  slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));
-  ShotBatch batch;
-  batch.may_be_put_off = true;
-  std::vector<const Measurement*> gathered, scattered;
-  for (const auto& want : slice) {
-    const auto& shooter = system_.shooters()[want.shooter];
-    if (shooter.isLight()) {
-      shots_.add(lights_[shooter.light], want.half, want.index, want.points,
-                 settings_.planner.lightResolution(want.index), batch);
-    } else {
-      shots_.add(shooter.place, want.half, want.index, shooter.resolution, batch);
-    }
-    (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
-  }
-  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
-  std::size_t taken = 0;
-  const auto take = [&](std::size_t i, LinkSample&& links) {
-    taken = i + 1;
-    const auto& want = *gathered[i];
-    const bool scattered = i >= batch.gather.size();
-    if (scattered) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
-    expander_.expand(links, scattered);
-    system_.addSample(want.shooter, want.half, expander_, links, want.points);
-  };
-  const auto done = transport_.measure(batch, take);
-  if (!done && done.error().code == ErrorCode::kCancelled) {
-    std::vector<Measurement> order;
-    for (const auto* want : gathered) order.push_back(*want);
-    std::ranges::copy(order, slice.begin());
-    measured_ += taken;
-    slice_.most = std::max<std::size_t>(taken, std::max<std::size_t>(slice_.fewest, 1));
-    return {};
-  }
-  if (!done) return tl::unexpected<Error>(done.error());
-  counters_ += *done;
-  measured_ += slice.size();
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_.most =
-      static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6),
-                                          static_cast<double>(slice_.fewest), 4096.0));
-  return {};
 }
 
 /// Of what an edit of geometry may have changed.
@@ -215,7 +156,7 @@ Result<StepOutcome> LinkedSolver::step() {
 
 Result<StepOutcome> LinkedSolver::advance() {
   if (assessing_ != Assessed::kNothing) return assessed();
-  if (in_haste_ && !settling_ && measured_ == wanted_.size()) forgetRough();
+  if (!settling_ && wave_.forgetRough()) phase_ = Phase::kLights;
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
     // Nothing else asks for the light over links that were the last to be measured.
@@ -227,11 +168,11 @@ Result<StepOutcome> LinkedSolver::advance() {
     if (repair_.lightsAreTooRough()) return StepOutcome::kSlice;
     if (!edit_lights_planned_) {  // what was switched on, or moved: all that follows depends on its light
       memory_.begin(system_);
-      wanted_ = planLights();
+      wave_.begin(planLights());
       edit_lights_planned_ = true;
     }
-    if (measured_ < wanted_.size()) {
-      if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+    if (!wave_.isMeasured()) {
+      if (const auto done = wave_.advance(counters_); !done) return tl::unexpected<Error>(done.error());
       return StepOutcome::kSlice;
     }
     if (!settleFromLinks() || findsMoreDue()) return StepOutcome::kSlice;
@@ -246,19 +187,18 @@ Result<StepOutcome> LinkedSolver::advance() {
     repair_.catchUp();
     return advance();
   }
-  if (!settling_ && measured_ == wanted_.size()) {
+  if (!settling_ && wave_.isMeasured()) {
     if (findsMoreDue()) return StepOutcome::kSlice;
-    wanted_ = plan();
-    measured_ = 0;
+    wave_.begin(plan());
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wanted_.empty() && phase_ == Phase::kImprove &&
+    if (wave_.wanted().empty() && phase_ == Phase::kImprove &&
         !gather_->isBehind())  // no sample that there is room for can lower the error
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
-    if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
+    if (wave_.wanted().empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
-  if (!settling_ && !wanted_.empty()) {
-    if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
-    if (measured_ < wanted_.size()) return StepOutcome::kSlice;
+  if (!settling_ && !wave_.wanted().empty()) {
+    if (const auto done = wave_.advance(counters_); !done) return tl::unexpected<Error>(done.error());
+    if (!wave_.isMeasured()) return StepOutcome::kSlice;
   }
   settling_ = true;  // also where memory runs out
   // Over the few links that there are beside rays nothing is gained by going on from the light before.
@@ -275,13 +215,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 void LinkedSolver::endWave() {
   if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
   if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || assessing_ != Assessed::kNothing) return;
-  // Without crowds most of the light may be missing; in haste they take less than one other measurement.
-  const auto left = wanted_.begin() + static_cast<std::ptrdiff_t>(measured_);
-  const auto is_crowd = [this](const Measurement& want) { return isFirstOfCrowd(want); };
-  if (measured_ == 0 && std::ranges::none_of(wanted_, is_crowd)) return;
-  wanted_.erase(std::remove_if(left, wanted_.end(), std::not_fn(is_crowd)), wanted_.end());
-  in_haste_ = true;
-  settling_ = measured_ == wanted_.size();
+  if (wave_.endInHaste()) settling_ = wave_.isMeasured();
 }
 
 StepOutcome LinkedSolver::finishRound() {
@@ -388,7 +322,7 @@ void LinkedSolver::setTargetError(double target) {
   if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
       error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it
     tryNow([this] { gather_->giveUp(); });
-    wanted_.resize(measured_);
+    wave_.endHere();
     settling_ = true;
   }
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;

@@ -23,6 +23,7 @@
 #include "server/solver/patches/lights.h"
 #include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/pipeline/kept_ends.h"
+#include "server/solver/pipeline/link_wave.h"
 #include "server/solver/pipeline/shaded_light.h"
 #include "server/solver/reflected/direct_smoothing.h"
 #include "server/solver/reflected/leaf_gather.h"
@@ -96,9 +97,6 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const LeafGather* gathered() const { return gather_.get(); }
 
  private:
-  /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
-  /// count.
-  static constexpr double kSliceSeconds = 0.06;
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
   enum class Pass { kNone, kFirst, kSecond, kRays };
@@ -125,11 +123,6 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] std::vector<Measurement> planLights();
   [[nodiscard]] bool forgetWeakest();
-  [[nodiscard]] Result<void> measureSlice();
-  [[nodiscard]] Result<void> measureSource(const Measurement& want);
-  [[nodiscard]] bool measureCrowd(const Measurement& want);
-  [[nodiscard]] bool isFirstOfCrowd(const Measurement& want) const;
-  void forgetRough();
   void takeCrowds(const std::vector<Crowd>& crowds);
   void addCrowd(const Crowd& crowd);
   [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
@@ -240,9 +233,8 @@ class LinkedSolver final : public Solver {
   Transport& transport_;
   SolverSettings settings_;
   std::vector<Side> sides_;
-  std::vector<LightPolygon> lights_;           // those switched off stay, dark: their links are still good
-  std::vector<Crowd> crowds_;                  // likewise
-  std::unique_ptr<CrowdSample> crowd_sample_;  // of the measurement under way; null: it has not begun
+  std::vector<LightPolygon> lights_;  // those switched off stay, dark: their links are still good
+  std::vector<Crowd> crowds_;         // likewise
   PunctualLights punctual_;
   std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
   std::vector<PunctualLights::Source> sky_;      // its hemispheres, where rays bring their light
@@ -267,11 +259,7 @@ class LinkedSolver final : public Solver {
   bool edit_lights_planned_ = false;  // of the edit being taken in
   bool is_confirmed_ = false;         // the light that there is was solved for from links and rays alone, just now
   bool settling_ = false;             // a wave is measured, its light is still to be solved for
-  std::vector<Measurement> wanted_;   // the wave under way
-  std::size_t measured_ = 0;          // of the wave
-  bool in_haste_ = false;             // its time is over
-  std::vector<Measurement> rough_;    // what it measured of crowds in haste
-  SliceLength slice_;                 // in measurements
+  LinkWave wave_;                     // under way
   bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
   double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
   std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;

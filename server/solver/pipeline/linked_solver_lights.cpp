@@ -78,38 +78,6 @@ void LinkedSolver::addCrowd(const Crowd& crowd) {
   (void)system_.add(shooter);
 }
 
-/// False: there is more to do.
-bool LinkedSolver::measureCrowd(const Measurement& want) {
-  const auto& crowd = crowds_[system_.shooters()[want.shooter].crowd];
-  if (!crowd_sample_ || !crowd_sample_->isOf(crowd, want.half, want.index))
-    crowd_sample_ =
-        std::make_unique<CrowdSample>(*patches_, sides_, *leafRays(), settings_.seed, crowd, want.half, want.index);
-  if (!crowd_sample_->advance(kSliceSeconds, in_haste_ ? CrowdSample::Leaves::kSome : CrowdSample::Leaves::kAll))
-    return false;
-  if (!crowd_sample_->isWhole()) rough_.push_back(want);
-  counters_.gather_shots += 1;
-  counters_.gather_points += CrowdSample::kDraws;
-  const auto links = std::exchange(crowd_sample_, nullptr)->links();
-  expander_.expand(links);
-  system_.addSample(want.shooter, want.half, expander_, links, want.points);
-  return true;
-}
-
-/// Without it there is no light of the crowd in this half.
-bool LinkedSolver::isFirstOfCrowd(const Measurement& want) const {
-  const auto& shooter = system_.shooters()[want.shooter];
-  return shooter.crowd != scene::kNone && shooter.column[want.half].points() == 0.0;
-}
-
-/// There is time again: what was measured in haste is measured anew.
-void LinkedSolver::forgetRough() {
-  in_haste_ = false;
-  for (const auto& want : std::exchange(rough_, {})) {
-    system_.forget(want.shooter, want.half);
-    phase_ = Phase::kLights;
-  }
-}
-
 std::size_t LinkedSolver::lightBytes() const {
   std::size_t bytes = 0;
   for (const auto& shooter : system_.shooters()) bytes += shooter.isLight() ? 2 * shooter.most_bytes : 0;
@@ -188,30 +156,6 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   }
   shaded_.addDirectTo(shootersAndLights(), factors, irradiance);
   return irradiance;
-}
-
-/// One sequence of shots of a light without extent.
-Result<void> LinkedSolver::measureSource(const Measurement& want) {
-  const auto& source = sources_[system_.shooters()[want.shooter].source];
-  ShotBatch batch;
-  batch.may_be_put_off = true;
-  batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
-  punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
-  FluxAccumulators flux;
-  flux.reset(patches_->nodeCount());
-  const auto done = transport_.run(batch, flux);
-  if (!done) return tl::unexpected<Error>(done.error());
-  counters_ += *done;
-  LinkSample links;
-  for (std::uint32_t node = 0; node < patches_->nodeCount(); ++node)
-    links.addFlux(node, flux.node[want.half][node][0], *patches_);
-  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
-  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  // The shots of a half carry half of an intensity of one.
-  links.scale(2.0 * kMeasureScale / batch.flux_scale);
-  expander_.expand(links);
-  system_.addSample(want.shooter, want.half, expander_, links, want.points);
-  return {};
 }
 
 /// Nobody can do without light: where there is no room for its links, the weakest shooters lose theirs.

@@ -11,8 +11,6 @@
 namespace radiosity::solver {
 namespace {
 
-/// A slice is to take so long.
-constexpr double kSliceSeconds = 0.06;
 /// Repairs of a slice at most: before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 /// Of the sum of what columns are wrong by, as ChangeReach has it, the light that they bring is wrong by less, since

@@ -64,7 +64,10 @@ struct Repair {
   [[nodiscard]] double roughness() const { return noise * (1.0 - static_cast<double>(looked) / samples); }
 };
 
-/// So many of what is done one after the other take some 50 ms, as far as is known; at least so many, for the workers.
+/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
+/// count.
+inline constexpr double kSliceSeconds = 0.06;
+/// So many of what is done one after the other take that long, as far as is known; at least so many, for the workers.
 struct SliceLength {
   std::size_t most, fewest;
 };
