@@ -74,6 +74,7 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   SolveRow row;
   row.asked_seconds = time;
   std::vector<std::string> arguments{"--time-limit", fmt::format("{:g}", time), "--error", fmt::format("{:g}", error)};
+  if (!options.chosen_texels) arguments.emplace_back("--means");  // whole texels are compared, as others bake them
   arguments.insert(arguments.end(), options.solve_arguments.begin(), options.solve_arguments.end());
   if (!series.sky.empty()) arguments.insert(arguments.end(), {"--sky", series.sky});
   const auto run =
