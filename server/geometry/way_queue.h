@@ -25,6 +25,9 @@ class WayQueue {
     if (++count_ == kPacket) flush(tell);
   }
 
+  /// Nothing waits for its answer.
+  [[nodiscard]] bool isEmpty() const { return count_ == 0; }
+
   /// To be called after the last.
   template <typename Tell>
   void flush(const Tell& tell) {

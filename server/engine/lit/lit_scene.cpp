@@ -454,13 +454,13 @@ std::size_t LitScene::warningCount() const {
 
 scene::LeafLight LitScene::ownLight() const { return leafLight(*solver_, settings_); }
 
-void LitScene::probeSurface(double seconds) {
+void LitScene::probeSurface(double seconds, bool is_late) {
   if (!surface_probe_.hasBegun()) {
     const auto light = ownLight();
     surface_probe_.begin({*patches_, solver_->rays(), normals_, materials_, sources_, light.mean}, settings_.seed,
                          scene::assemblePages(*patches_, scene::fitTexels(*patches_, light)), settings_.target_error);
   }
-  surface_probe_.advance(seconds);
+  surface_probe_.advance(seconds, is_late);
 }
 
 std::vector<scene::LightmapPage> LitScene::pages() const {

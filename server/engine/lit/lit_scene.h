@@ -191,8 +191,9 @@ class LitScene {
   /// changed. Once for each edit; costs two passes over the pages.
   [[nodiscard]] bool showDirectLight();
 
-  /// Goes on for about `seconds` with measuring what surfaceError() tells of the light that there is.
-  void probeSurface(double seconds);
+  /// Goes on for about `seconds` with measuring what surfaceError() tells of the light that there is; `is_late`: no
+  /// longer than it must.
+  void probeSurface(double seconds, bool is_late);
   /// The light has been solved further.
   void forgetSurface() { surface_probe_.forget(); }
   /// There is no memory to measure it with: not before the light has changed.

@@ -19,7 +19,8 @@ void SurfaceProbe::begin(const solver::SolvedScene& solved, std::uint64_t seed,
   measuring_ = std::move(measuring);  // not before it is whole: memory may run out on the way
 }
 
-void SurfaceProbe::advance(double seconds) {
+void SurfaceProbe::advance(double seconds, bool is_late) {
+  if (is_late) measuring_->hurry();
   if (!measuring_->advance(seconds)) return;
   stated_ = measuring_->stated();
   measured_ = measuring_->measured();

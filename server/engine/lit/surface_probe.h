@@ -28,12 +28,12 @@ class SurfaceProbe {
   /// Neither measured nor given up.
   [[nodiscard]] bool isLacking() const { return !stated_ && !given_up_; }
   [[nodiscard]] bool hasBegun() const { return measuring_ != nullptr; }
-  /// `solved` is to stay as it is until forget(); lookups are made in `pages`.
-  /// `target`: the error that is asked for, which is to be told from a larger one.
+  /// `solved` is to stay as it is until forget(); lookups are made in `pages`. What is measured is to be told from
+  /// `target`, the error that is asked for.
   void begin(const solver::SolvedScene& solved, std::uint64_t seed, std::span<const scene::LightmapPage> pages,
              double target);
-  /// Once it has begun: goes on for about `seconds`.
-  void advance(double seconds);
+  /// Once it has begun: goes on for about `seconds`. `is_late`: no longer than it must.
+  void advance(double seconds, bool is_late);
   /// Nothing: it is not measured yet.
   [[nodiscard]] const std::optional<solver::SurfaceErrorParts>& stated() const { return stated_; }
   /// Place by place, what that was found by.

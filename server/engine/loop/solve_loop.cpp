@@ -286,7 +286,7 @@ bool SolveLoop::probesSurface() const {
 
 /// Takes no solve time: what is shown stays what it is.
 void SolveLoop::probeSurface() {
-  lit_->probeSurface(kProbeSeconds);
+  lit_->probeSurface(kProbeSeconds, isOutOfTime());
   if (!lit_->lacksSurface()) updateStatus(true);
 }
 

@@ -329,9 +329,12 @@ void SolveLoop::reconsiderStop() {
   if (state_ != SolveState::kConverged && state_ != SolveState::kTimeLimit && state_ != SolveState::kLimited) return;
   // Where the program chooses texels, what is not measured counts as not reached: it will be.
   const auto& surface = lit_->surfaceError();
-  const bool reached = settings_.choosesTexels()
-                           ? surface && surface->total <= aimAtSurface(*surface, settings_.target_error)
-                           : lit_->solver().error().total <= settings_.target_error;
+  // What has ended once though 95 % of places are further off could have no more.
+  const auto aim = [&] {
+    return state_ == SolveState::kConverged ? settings_.target_error : aimAtSurface(*surface, settings_.target_error);
+  };
+  const bool reached = settings_.choosesTexels() ? surface && surface->total <= aim()
+                                                 : lit_->solver().error().total <= settings_.target_error;
   if (state_ == SolveState::kLimited && !reached && !settings_.choosesTexels()) return;
   failure_.clear();
   const SolveState now = reached         ? SolveState::kConverged

@@ -52,7 +52,7 @@ void SolveLoop::refineSlice() {
   if (refinement_->job) {
     takeRefined();
   } else {
-    lit_->probeSurface(kProbeSeconds);
+    lit_->probeSurface(kProbeSeconds, isOutOfTime());
     if (!lit_->lacksSurface()) {
       updateStatus(true);  // who waits for no more than this goes on
       judgeTexels();
@@ -66,6 +66,9 @@ void SolveLoop::judgeTexels() {
   const auto surface = *lit_->surfaceError();
   const double left = surface.total, aim = aimAtSurface(surface, settings_.target_error);
   if (left <= aim) return endRefinement(SolveState::kConverged, {});
+  const bool is_reached = left <= settings_.target_error;  // though not by 95 % of places
+  if (is_reached && (isOutOfTime() || refinement_->otherwise == SolveState::kLimited))
+    return endRefinement(SolveState::kConverged, {});
   if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels(aim);
   const auto texels = static_cast<double>(lit_->patchCount());
@@ -76,11 +79,11 @@ void SolveLoop::judgeTexels() {
   if (can_solve && wanted.present < fine * aim && lit_->solveCloser(noiseShare(left, wanted.present, aim)))
     return dropRefinement();
   if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted), aim);
-  if (left <= settings_.target_error) return endRefinement(SolveState::kConverged, {});
+  if (is_reached) return endRefinement(SolveState::kConverged, {});
   if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
   auto why = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
                          settings_.texels, 100.0 * left);
-  const auto enough = lit_->enoughTexels(aim);
+  const auto enough = lit_->enoughTexels(settings_.target_error);
   if (enough && *enough > static_cast<double>(settings_.texels))
     why += fmt::format("; about {:.0f} would reach {:.2g} %", inTwoDigits(*enough), 100.0 * settings_.target_error);
   endRefinement(SolveState::kLimited, std::move(why));

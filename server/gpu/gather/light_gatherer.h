@@ -47,6 +47,8 @@ class LightGatherer {
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point);
   /// That are done since beginLinks().
   [[nodiscard]] std::uint32_t lookCount() const { return look_count_; }
+  /// Grows with all that looks by rays find out.
+  [[nodiscard]] std::array<std::uint32_t, 3> place() const { return {look_count_, asked_.receivers, asked_.edges}; }
   /// Finds the places of some receivers, for windowOf() at all points of the shot.
   void findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named);
   /// What a look at these, and at boxes, can show; nothing where that is nearly all.

@@ -117,20 +117,14 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
   float* visible_weight = lit_.visible_weight[half].data();
   geometry::WayQueue<std::uint32_t> ways(receivers_->rays());
   const auto tell = [&](std::uint32_t i) { visible_weight[i] += lit_.point_weight[i]; };
-  auto& i = asked_.receivers;
-  try {
-    for (; i < lit_count_; ++i) {
-      if (lit_.point_weight[i] <= 0.0F) continue;
-      interruptionPoint();
-      weight[i] += lit_.point_weight[i];
-      const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
-      const auto from = at + Receivers::kLift * normal;
-      const glm::vec3 light(lit_.light_x[i], lit_.light_y[i], lit_.light_z[i]);
-      ways.add(from, light + lift - from, receivers_->wayKey(key, at), i, tell);
-    }
-  } catch (const Interrupted&) {
-    ways.flush(tell);
-    throw;
+  for (auto& i = asked_.receivers; i < lit_count_; ++i) {
+    if (lit_.point_weight[i] <= 0.0F) continue;
+    if (ways.isEmpty()) interruptionPoint();  // so that packets hold the same ways wherever it is interrupted
+    weight[i] += lit_.point_weight[i];
+    const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
+    const auto from = at + Receivers::kLift * normal;
+    const glm::vec3 light(lit_.light_x[i], lit_.light_y[i], lit_.light_z[i]);
+    ways.add(from, light + lift - from, receivers_->wayKey(key, at), i, tell);
   }
   ways.flush(tell);
   lookFromEdges(shot, point, half);

@@ -12,12 +12,14 @@ Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, con
   if (!receivers_) return fail(ErrorCode::kInternal, "setScene must come before measure");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
   solver::TransportCounters counters;
+  came_to_ = gatherer_.place();
   if (sight_ == Sight::kRays && shots.mode != solver::LinkMode::kPaperMipmap) {
     measureByRays(shots, take, counters);
   } else {
     begun_.reset();
     measureGather(shots, take, counters);
   }
+  begun_.reset();
   measureScatter(shots, take, counters);
   if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
   return counters;
@@ -62,6 +64,7 @@ void ShotRunner::measureByRays(const ShotSpan& shots, const solver::Transport::T
       begun_.reset();
       gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
       begun_ = std::move(wanted);
+      came_to_ = {};
     }
     while (gatherer_.lookCount() < shot.point_count)
       gatherer_.look(shot, shots.points[shot.first_point + gatherer_.lookCount()]);

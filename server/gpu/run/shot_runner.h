@@ -1,6 +1,7 @@
 // Carries out shots, one after the other, with images from wherever its source has them. One thread.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -44,8 +45,9 @@ class ShotRunner {
   /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
                                                           const solver::Transport::TakeLinks& take);
-  /// measure() was interrupted in a shot that the next one goes on with from there, if it comes first in it.
-  [[nodiscard]] bool keepsPlace() const { return begun_.has_value(); }
+  /// measure() was interrupted in a shot that it got further with, and that the next one goes on with from there, if it
+  /// comes first in it.
+  [[nodiscard]] bool keepsPlace() const { return begun_ && gatherer_.place() > came_to_; }
 
  private:
   /// A shot with all that its links follow from.
@@ -71,7 +73,8 @@ class ShotRunner {
   Sight sight_ = Sight::kImages;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
-  std::optional<BegunShot> begun_;  ///< that gatherer_ is at, by rays
+  std::optional<BegunShot> begun_;          ///< that gatherer_ is at, by rays
+  std::array<std::uint32_t, 3> came_to_{};  ///< LightGatherer::place() when the present measure() took it up
   std::shared_ptr<const Receivers> receivers_;
   std::optional<FluxStore> link_store_;
   PunctualGatherer punctual_;

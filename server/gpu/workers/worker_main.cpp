@@ -88,12 +88,14 @@ class Worker {
     };
     Task task(putOffMark(flux_.bytes()), head.batch);
     Result<solver::TransportCounters> counters;
+    bool has_begun = false;
     try {
       const TaskScope scope(&task);
       interruptionPoint();
+      has_begun = true;
       counters = head.measure != 0 ? crew_->measure(shots, pack) : crew_->run(shots, *sink_);
     } catch (const Interrupted&) {
-      return replyDone({head.chunk, crew_->keepsPlace() ? kKeepsPlace : 1, taken, {}}, links);
+      return replyDone({head.chunk, has_begun && crew_->keepsPlace() ? kKeepsPlace : 1, taken, {}}, links);
     }
     if (!counters) return tl::unexpected(counters.error());
     return replyDone({head.chunk, 0, taken, *counters}, links);

@@ -368,12 +368,15 @@ class WorkerTransport final : public solver::Transport {
     }
     const bool is_put_off = put_off_ && report.put_off != 0;
     lacks_ |= is_put_off;
-    keeps_place_ |= is_put_off && report.put_off == kKeepsPlace;
     const auto& chunk = chunks_[report.chunk];
     if (take_ != nullptr && !takeLinks(from, chunk, is_put_off ? std::min(report.shots, chunk.count) : chunk.count)) {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
       return;
     }
+    // Of links the first that is not there yet: those after it are thrown away.
+    const auto first = chunk.first + (chunk.kind == ShotKind::kGather ? 0 : gather_shots_);
+    const bool is_next = first <= next_taken_ && next_taken_ < first + chunk.count;
+    keeps_place_ |= is_put_off && report.put_off == kKeepsPlace && is_next;
     slot.held.pop_front();
     slot.done.push_back(report.chunk);
     if (!slot.held.empty()) startClock(slot);

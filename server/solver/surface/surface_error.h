@@ -3,6 +3,7 @@
 // of the calls.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -40,13 +41,17 @@ class SurfaceError {
     glm::vec2 texel{0.0F};
   };
   [[nodiscard]] std::vector<Lookup> lookups() const;
-  /// A total that is likely to be off by more than this, and by more than a quarter of itself, is measured again.
+  /// A total is measured again that is likely to be off by more than this, and by more than a quarter of itself, since
+  /// the truth that lookups are held against is an estimate.
   void setWantedDeviation(double deviation) { wanted_deviation_ = deviation; }
+  /// There is no time for another round.
+  void hurry() { most_rounds_ = std::min(most_rounds_, rounds_ + 1); }
   /// What they find, lux, in that order. Before advance().
   void take(std::vector<glm::vec3> found) { found_ = std::move(found); }
 
-  /// Goes on for about `seconds`, on all cores. True: it is done. Where the cuts lie changes no bit. Cost: PlaceLight,
-  /// twice a place and round; a quarter of a second on two cores in a room of a thousand triangles, a round.
+  /// Goes on for about `seconds`, on all cores. Throws std::bad_alloc, and may be called again then. True: it is done.
+  /// Where the cuts lie changes no bit. Cost: PlaceLight, twice a place and round; a quarter of a second on two cores
+  /// in a room of a thousand triangles, a round.
   [[nodiscard]] bool advance(double seconds);
   /// When it is done: what was found at each place, in the order of lookups().
   struct Measured {
@@ -60,6 +65,7 @@ class SurfaceError {
 
  private:
   [[nodiscard]] double percentile(std::span<const std::array<double, 2>> weights, double floor) const;
+  void addSlice();
   [[nodiscard]] bool isSure() const;
   /// Irradiance, lux: one of the two estimates of a place.
   [[nodiscard]] glm::dvec3 trueLight(std::size_t place, std::size_t estimate) const;
@@ -71,7 +77,8 @@ class SurfaceError {
   std::vector<glm::vec3> found_;
   std::vector<std::array<glm::dvec3, 2>> sums_;  ///< two independent estimates, by place, each of all rounds
   std::size_t done_ = 0;                         ///< places of this round
-  std::uint32_t rounds_ = 0;                     ///< that are done
+  std::uint32_t rounds_ = 0, most_rounds_ = kMostRounds;
+  bool is_done_ = false;
   double wanted_deviation_ = 1.0;
 };
 

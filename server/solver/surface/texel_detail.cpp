@@ -57,7 +57,8 @@ struct Grid {
   }
 
   /// Area times the square of what lookups on a leaf have, in the mean, of the noise of texels: smoothing makes those
-  /// alike that lie side by side, and what they have in common no lookup averages.
+  /// alike that lie side by side, and what they have in common no lookup averages. Fits make it larger where light
+  /// bends (fitTexels), which is left out: they do where most of the bend is light.
   [[nodiscard]] double noiseOfLookups(std::uint32_t x, std::uint32_t y) const {
     const auto noiseAt = [&](std::uint32_t nx, std::uint32_t ny) {
       // Beyond the chart, and where nothing is known, lookups find what is nearest.
