@@ -6,6 +6,7 @@
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
 #include "server/scene/lightmap/lightmap.h"
+#include "server/scene/lightmap/texel_fit.h"
 #include "server/scene/shading/shade.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
@@ -36,6 +37,19 @@ void shade(benchmark::State& state) {
   label(state);
   const auto& patches = *patchesOf(state.range(0)).patches;
   for (auto _ : state) benchmark::DoNotOptimize(scene::shadePatches(importedScene(state.range(0)), patches));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
+}
+
+/// Of irradiance with noise: what a publication costs before its pages.
+void fit(benchmark::State& state) {
+  label(state);
+  const auto& patches = *patchesOf(state.range(0)).patches;
+  scene::LeafLight light{std::vector<glm::vec3>(patches.nodeCount()), std::vector<glm::vec3>(patches.nodeCount())};
+  for (std::size_t n = 0; n < patches.nodeCount(); ++n) {
+    light.mean[n] = glm::vec3(1.0F + 0.1F * static_cast<float>(n % 7));
+    light.difference[n] = glm::vec3(0.1F * static_cast<float>(n % 5));
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(scene::fitTexels(patches, light));
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
 }
 
@@ -95,6 +109,7 @@ BENCHMARK(charts)
     ->ArgsProduct({{kCornell, kSmallRoom, kSeminarRoom}, {16, 64, 256}})
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(shade)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
+BENCHMARK(fit)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
 BENCHMARK(pages)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
 BENCHMARK(memory)
     ->ArgNames({"scene"})

@@ -12,16 +12,20 @@ namespace {
 
 using scene::Seams;
 
-std::vector<glm::vec3> radiosity(const LitScene& lit) {
-  const auto irradiance = fitTexels(lit.patches(), lit.ownLight());
-  std::vector<glm::vec3> values(irradiance.size());
+/// What emits, and what is reflected of the light that assemble() fits.
+QuantityValues radiosity(const LitScene& lit) {
+  QuantityValues values{Quantity::kRadiosity, {}, {}, false, lit.ownLight(), {}};
+  values.nodes.resize(lit.patches().nodeCount());
+  values.reflectance.resize(lit.patches().nodeCount());
   std::size_t side = 0;
   for (const auto& surface : lit.patches().surfaces) {
     for (const auto first : surface.first_node) {
       if (first == scene::kNone) continue;
       const auto emission = lit.materials().emission.side(side), reflectance = lit.materials().reflectance.side(side);
-      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
-        values[first + leaf] = emission[leaf] + reflectance[leaf] * irradiance[first + leaf];
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+        values.nodes[first + leaf] = emission[leaf];
+        values.reflectance[first + leaf] = reflectance[leaf];
+      }
       ++side;
     }
   }
@@ -87,9 +91,9 @@ std::vector<IdImage> idPages(const LitScene& lit, Quantity quantity) {
 QuantityValues readQuantity(const LitScene& lit, Quantity quantity) {
   switch (quantity) {
     case Quantity::kIrradiance:
-      return {quantity, {}, {}, false, lit.ownLight()};
+      return {quantity, {}, {}, false, lit.ownLight(), {}};
     case Quantity::kRadiosity:
-      return {quantity, radiosity(lit), {}, false};
+      return radiosity(lit);
     case Quantity::kError:
       return {quantity, errorSquared(lit), {}, true};
     case Quantity::kUnshot:
@@ -107,6 +111,10 @@ QuantityPages assemble(const scene::PatchScene& patches, QuantityValues values) 
   QuantityPages pages{values.quantity, {}, std::move(values.ids), values.squared};
   const auto seams = values.quantity == Quantity::kIrradiance ? Seams::kStitched : Seams::kLeft;
   if (values.quantity == Quantity::kIrradiance) values.nodes = fitTexels(patches, values.light);
+  if (values.quantity == Quantity::kRadiosity) {
+    const auto irradiance = fitTexels(patches, values.light);
+    for (std::size_t n = 0; n < irradiance.size(); ++n) values.nodes[n] += values.reflectance[n] * irradiance[n];
+  }
   if (!holdsIds(values.quantity)) pages.values = assemblePages(patches, values.nodes, seams);
   return pages;
 }

@@ -22,10 +22,12 @@ struct QuantityPages {
 /// A quantity as the solver has it at one moment.
 struct QuantityValues {
   Quantity quantity = Quantity::kIrradiance;
-  std::vector<glm::vec3> nodes;  ///< by node; empty where the quantity is irradiance, or whole numbers
-  std::vector<IdImage> ids;      ///< finished pages of those
-  bool squared = false;          ///< as QuantityPages::squared
-  scene::LeafLight light = {};   ///< of irradiance
+  /// By node; of radiosity what is emitted. Empty where the quantity is irradiance, or whole numbers.
+  std::vector<glm::vec3> nodes;
+  std::vector<IdImage> ids;     ///< finished pages of those
+  bool squared = false;         ///< as QuantityPages::squared
+  scene::LeafLight light = {};  ///< of irradiance and radiosity: to be fitted to texels, away from the solve thread
+  std::vector<glm::vec3> reflectance = {};  ///< of radiosity, by node
 };
 
 /// Costs a pass over all leaves.
