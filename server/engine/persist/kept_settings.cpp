@@ -52,6 +52,7 @@ std::map<std::string, std::string> keptSettings(const SolveSettings& settings) {
 
 SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::string>& kept,
                        const std::set<std::string>& named) {
+  if (kept.empty()) return settings;  // a new folder
   const auto real = [&](const char* name) { return numberIn<double>(kept, name); };
   const auto whole = [&](const char* name) { return numberIn<std::uint64_t>(kept, name); };
   const auto method = kept.contains("method") ? methodFrom(kept.at("method")) : std::nullopt;

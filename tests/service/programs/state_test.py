@@ -69,6 +69,18 @@ class KilledTest(StateCase):
         self.assertGreater(ledger.total, KILLS)
         self.assertEqual(server.terminate(), 0, server.log())
 
+    def test_aServerChoosesTexelsFromTheStartAndAfterItWasKilled(self):
+        for _ in range(2):
+            server = self.keeper(CHOSEN)
+
+            async def settings():
+                session = await Session.open(server.url)
+                return await session.call("solve.configure")
+
+            found = self.run_async(settings())
+            self.assertEqual((found["adaptive"], found["texels"]), (True, 500))
+            server.kill()
+
     def test_undoAndHistoryGoOn(self):
         server = self.keeper()
 

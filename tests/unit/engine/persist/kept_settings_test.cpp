@@ -24,6 +24,16 @@ TEST(KeptSettings, GoBeforeWhatTheCommandLineDoesNotName) {
   EXPECT_EQ(withKept({}, keptSettings(kept), {"texels"}).texels, kTexels);
 }
 
+// A folder that is new has none; one of an older version had texels of one size.
+TEST(KeptSettings, OfANewFolderTakeNothingFromThoseThatThereAre) {
+  auto wanted = chosen();
+  wanted.double_sided = true;
+  EXPECT_EQ(withKept(wanted, {}, {}), wanted);
+  auto old = keptSettings(chosen());
+  old.erase("adaptive");
+  EXPECT_FALSE(withKept(chosen(), old, {}).adaptive);
+}
+
 // The most that the program may choose were kept, not a million of one size.
 TEST(KeptSettings, AsManyTexelsAsUsualAreAsManyAsAreUsualNow) {
   SolveSettings uniform;
