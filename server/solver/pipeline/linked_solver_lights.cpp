@@ -120,6 +120,7 @@ std::size_t LinkedSolver::lightBytes() const {
 void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
   sky_.clear();
+  punctual_.setRaysSeeSky(by_rays_);
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
     if (by_rays_ && source.kind == PunctualLights::Source::Kind::kSky) {
       sky_.push_back(source);

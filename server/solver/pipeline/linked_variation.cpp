@@ -81,9 +81,10 @@ bool LinkedSolver::updateVariation(LeafVariation& variation, double seconds) {
   const double square = square_ = std::accumulate(squares.begin(), squares.end(), 0.0);
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
+  const SkyLight sky(sources);
   const double bound = kNegligible * aim_;
   return variation.update(
-      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr},
+      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr, &sky},
       bound * bound * square, seconds);
 }
 
