@@ -74,9 +74,13 @@ TEST(ImportSky, PicturesBecomeABufferView) {
   const auto& json = document->gltf["extras"]["radiositySky"];
   EXPECT_FALSE(json.contains("uri"));
   ASSERT_TRUE(json.contains("bufferView"));
-  test::expectSavedAndReadAsItIs(*document);
+  const auto again = parseDocument("again.glb", *writeGlb(*document));
+  ASSERT_TRUE(again) << again.error().text();
+  const auto saved = importScene(*again, {});
+  ASSERT_TRUE(saved) << saved.error().text();
   const auto sky = imported(builder).sky;
   ASSERT_TRUE(sky && sky->picture);
+  EXPECT_EQ(saved->sky, sky);
   EXPECT_EQ(sky->strength, 3.0F);
   EXPECT_DOUBLE_EQ(sky->turn_rad, 0.5 * kPi);
   EXPECT_EQ(sky->upper, glm::vec3(1.0F));
@@ -122,7 +126,7 @@ TEST(ImportSky, DaylightIsASkyAndASun) {
   ASSERT_TRUE(sky && sky->picture && sky->sun);
   EXPECT_NEAR(sky->sun->diameter_rad, kSunDegrees * kPi / 180.0, 1e-9);
   EXPECT_NEAR(std::asin(sky->sun->direction.y) * 180.0 / kPi, 61.0, 1.5) << "an hour before it is highest";
-  EXPECT_GT(sky->sun->direction.x, 0.5) << "the south was turned to the east";
+  EXPECT_NEAR(sky->sun->direction.x, 0.38, 0.03) << "what it had towards the south is towards the east";
   EXPECT_NEAR(static_cast<double>(sky->sun->illuminance.x), 90'000.0, 15'000.0);
   const auto cie = imported(withSky({{"daylight", {{"sky", "overcast"}, {"diffuse", 1000}, {"ground", 0.5}}}})).sky;
   ASSERT_TRUE(cie && cie->picture);
