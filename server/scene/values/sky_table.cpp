@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr std::size_t kHead = 4, kOfRectangle = 5;
-/// Rectangles are cut until what their light may be off by, times how far, is less than this part of all light (rad): so
-/// little that the sky around a sun, a tenth of all light where that is hidden, is known to a degree or two.
+/// Rectangles are cut until what their light may be off by, times how far, is less than this part of all light (rad):
+/// so little that the sky around a sun, a tenth of all light where that is hidden, is known to a degree or two.
 constexpr double kSmooth = 1e-7;
 
 /// Columns [x0, x1) and rows [y0, y1) of a grid.
