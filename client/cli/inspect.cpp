@@ -25,7 +25,7 @@ struct LoadOptions {
 /// Uploads beside a connection that tells how far the load is. Where there is none to be had the upload says why.
 Result<Loaded> uploadWatched(const Remote& remote, const std::string& scene, ProgressDisplay& display) {
   auto connection = remote.connect();
-  if (!connection) return uploadScene(remote, scene, display);
+  if (!connection) return uploadScene(remote, scene, {}, display);
   connection->onNotification([&display](const protocol::Notification& note) {
     const auto* progress = std::get_if<protocol::ProgressNote>(&note);
     if (progress != nullptr && progress->progress.state == "loading") display.show(viewOf(progress->progress, 1.0));
@@ -35,7 +35,7 @@ Result<Loaded> uploadWatched(const Remote& remote, const std::string& scene, Pro
     (void)connection->poll(std::chrono::milliseconds(0));  // one that broke tells nothing more
     return remote.keep_going();
   };
-  return uploadScene(uploader, scene, display);
+  return uploadScene(uploader, scene, {}, display);
 }
 
 ExitCode load(const LoadOptions& options) {

@@ -1,4 +1,5 @@
-// radiosity set, move, rotate, scale, hide, show, remove, add, undo, redo, history: short forms of what people do most.
+// radiosity set, move, rotate, scale, hide, show, remove, add, sky, undo, redo, history: short forms of what people do
+// most.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@
 #include "client/cli/model_merge.h"
 #include "client/cli/scene_edits.h"
 #include "client/cli/scene_file.h"
+#include "client/cli/sky_options.h"
 #include "common/one_line.h"
 #include "protocol/http_bodies.h"
 
@@ -224,6 +226,41 @@ void addAdd(CLI::App& app, Run& run) {
   command.callback([options, &run] { run = [options] { return addModel(*options); }; });
 }
 
+// ---- sky ----
+
+ExitCode changeSky(const RemoteOptions& server, const SkyOptions& options) {
+  const auto remote = remoteFrom(server);
+  if (!remote) return complain(remote.error());
+  const auto choice = skyChoice(options);
+  if (!choice) return complain(choice.error());
+  if (choice->colours)
+    return complain(Error{ErrorCode::kBadUsage, "colours are a setting of the server: a picture or a model is an edit",
+                          "--sky " + options.sky});
+  if (!choice->isOfScene()) return complain(Error{ErrorCode::kBadUsage, "there is neither --sky nor --sun", {}});
+  auto picture = readPicture(*choice);
+  if (!picture) return complain(picture.error());
+  const auto bytes = picture->size();
+  const auto uri = uploadBin(*remote, std::move(*picture), choice->picture);
+  if (!uri) return complain(uri.error());
+  const auto reply =
+      editScene(*remote, [&](const Json& gltf) -> Result<Json> { return skyPatch(gltf, *choice, *uri, bytes); });
+  if (!reply) return complain(reply.error());
+  printEdit(reply->revision, reply->affected_surfaces, reply->affected_shots);
+  return ExitCode::kOk;
+}
+
+void addSky(CLI::App& app, Run& run) {
+  struct Options {
+    RemoteOptions server;
+    SkyOptions sky;
+  };
+  auto options = std::make_shared<Options>();
+  auto& command = *app.add_subcommand("sky", "give the scene another sky: a picture, or daylight");
+  addRemoteOptions(command, options->server);
+  addSkyOptions(command, options->sky);
+  command.callback([options, &run] { run = [options] { return changeSky(options->server, options->sky); }; });
+}
+
 // ---- undo, redo, history ----
 
 template <typename Call>
@@ -292,6 +329,7 @@ void addQuickEdits(CLI::App& app, Run& run) {
   addVisibility(app, run, "show", "switch a node on again", true);
   addRemove(app, run);
   addAdd(app, run);
+  addSky(app, run);
   addStep<protocol::SceneUndoCall>(app, run, "undo", "take the latest edit back, whoever made it", "took back");
   addStep<protocol::SceneRedoCall>(app, run, "redo", "make the edit again that was taken back last", "made again");
   addHistory(app, run);

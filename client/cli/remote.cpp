@@ -163,14 +163,20 @@ Error httpError(const client::HttpReply& reply, const std::string& where) {
   return error;
 }
 
-Result<Loaded> uploadScene(const Remote& remote, const std::string& path, ProgressDisplay& display) {
+Result<Loaded> uploadScene(const Remote& remote, const std::string& path, const SkyChoice& sky,
+                           ProgressDisplay& display) {
   const auto kind = sceneKind(path);
   if (!kind) return tl::unexpected(kind.error());
   auto http = remote.http();
   http.progress = showTransfer(display, "uploading " + path);
   const std::string target = "/scene?name=" + client::percentEncode(std::filesystem::path(path).filename().string());
   Result<client::HttpReply> reply = client::HttpReply{};
-  if (*kind == SceneKind::kGlb) {
+  if (sky.isOfScene()) {
+    auto made = withSky(path, sky);
+    if (!made) return tl::unexpected(made.error());
+    reply = client::httpPutText(http, target, made->is_glb ? "model/gltf-binary" : "model/gltf+json",
+                                std::move(made->bytes));
+  } else if (*kind == SceneKind::kGlb) {
     reply = client::httpPutFile(http, target, "model/gltf-binary", path);
   } else {
     auto text = inlineExternalFiles(path);

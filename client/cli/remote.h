@@ -7,6 +7,7 @@
 
 #include "client/cli/exit_code.h"
 #include "client/cli/progress_line.h"
+#include "client/cli/sky_options.h"
 #include "client/lib/connection.h"
 #include "client/lib/http.h"
 #include "common/result.h"
@@ -46,8 +47,10 @@ struct Loaded {
   std::uint64_t revision = 0;
   std::vector<std::string> warnings;
 };
-/// Sends a scene file (PUT /scene): GLB as it is, glTF with its external files packed in.
-[[nodiscard]] Result<Loaded> uploadScene(const Remote& remote, const std::string& path, ProgressDisplay& display);
+/// Sends a scene file (PUT /scene): GLB as it is, glTF with its external files packed in; either with another sky where
+/// one is chosen for the scene.
+[[nodiscard]] Result<Loaded> uploadScene(const Remote& remote, const std::string& path, const SkyChoice& sky,
+                                         ProgressDisplay& display);
 
 /// Downloads GLB and lightmap pages of one revision, complete or not at all: "OUT.glb" and "OUT.lightmap.<page>.exr";
 /// with `error_map` also "OUT.error.<page>.exr", the standard error of the lightmaps' texels in lux.

@@ -13,6 +13,7 @@
 #include "client/cli/report.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/server_process.h"
+#include "client/cli/sky_options.h"
 #include "common/one_line.h"
 
 namespace radiosity::cli {
@@ -29,7 +30,8 @@ constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps st
 constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png, sky;
+  std::string scene, output, report, png;
+  SkyOptions sky;
   std::string state;  ///< folder; empty: an interrupted solve is lost
   RemoteOptions server;
   double error = 0.02;
@@ -84,15 +86,13 @@ class Solve {
   }
 
   Result<void> checkInputs() {
-    if (!options_.sky.empty()) {
-      auto sky = protocol::parseSky(options_.sky);
-      if (!sky) return tl::unexpected(sky.error());
-      sky_ = *sky;
-    }
+    auto sky = skyChoice(options_.sky);
+    if (!sky) return tl::unexpected(sky.error());
+    sky_ = std::move(*sky);
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
     if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
-    if (*kind == SceneKind::kGltf && options_.server.url.empty()) {
+    if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
       by_path_ = *external;
@@ -147,8 +147,8 @@ class Solve {
                                       .texels = options_.texels > 0 ? options_.texels : usualTexels(chooses),
                                       .texel_size_m = options_.texel_size_m,
                                       .seed = options_.seed,
-                                      .sky = sky_,
-                                      .no_sky = !sky_,
+                                      .sky = sky_.colours,
+                                      .no_sky = !sky_.colours,
                                       .double_sided = options_.double_sided,
                                       .adaptive = !options_.uniform,
                                       .method = options_.method};
@@ -166,7 +166,7 @@ class Solve {
       (void)connection.poll(0ms);  // one that broke shows in the next call
       return remote_.keep_going();
     };
-    auto loaded = uploadScene(uploader, options_.scene, display_);
+    auto loaded = uploadScene(uploader, options_.scene, sky_, display_);
     if (!loaded) return tl::unexpected(CallFailure{loaded.error()});
     revision_ = loaded->revision;
     return {};
@@ -310,7 +310,7 @@ class Solve {
   ProgressDisplay display_;
   std::optional<ServerProcess> server_;
   Remote remote_;
-  std::optional<protocol::Sky> sky_;
+  SkyChoice sky_;
   bool by_path_ = false;        ///< the private server reads the scene itself
   std::uint64_t revision_ = 0;  ///< of our scene; 0: not known
   bool ask_now_ = false, replaced_ = false;
@@ -382,11 +382,7 @@ void addSolve(CLI::App& app, Run& run) {
                                                                         {"paper", Method::kPaper}})
                       .description(""))
       ->type_name("METHOD");
-  command
-      .add_option("--sky", options->sky,
-                  "light from outside, in nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the horizon); for scenes "
-                  "without a sky of their own")
-      ->type_name("NITS");
+  addSkyOptions(command, options->sky);
   auto* workers =
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
           ->check(CLI::Range(1U, 256U).description(""))

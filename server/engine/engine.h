@@ -368,6 +368,10 @@ class Engine {
   virtual void sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) = 0;
   /// GLB with KHR_materials_unlit textures, tone-mapped.
   virtual void unlitGlb(Client client, Callback<SharedBytes> done) = 0;
+  /// The sky as Radiance HDR, equirectangular, nits. kNotFound: there is none, or it is two colours.
+  virtual void skyPicture(Client /*client*/, Callback<SharedBytes> done) {
+    done(fail(ErrorCode::kNotFound, "the sky is no picture"));
+  }
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) = 0;
   virtual void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) = 0;

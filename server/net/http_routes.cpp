@@ -147,6 +147,10 @@ void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
   hub->engine().unlitGlb(clientOf(request), fileAnswer(*hub, done, "model/gltf-binary"));
 }
 
+void getSky(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  hub->engine().skyPicture(clientOf(request), fileAnswer(*hub, done, "image/vnd.radiance"));
+}
+
 void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
   std::uint32_t page = 0;
   const auto text = std::string_view(request.path).substr(std::string_view("/lightmaps/").size());
@@ -224,21 +228,14 @@ struct Route {
 
 constexpr std::array kRoutes = {
     Route{"/", "GET", getViewer, true},  // the viewer holds no secrets, and asks for the token itself
-    Route{"/assets/", "GET", getViewer, true},
-    Route{"/favicon.svg", "GET", getViewer, true},
-    Route{"/status", "GET", getStatus},
-    Route{"/scene", "PUT", putScene},
-    Route{"/uploads", "PUT", putUpload},
-    Route{"/scene.gltf", "GET", getSceneGltf},
-    Route{"/scene.glb", "GET", getSceneGlb},
-    Route{"/scene-unlit.glb", "GET", getUnlitGlb},
-    Route{"/lightmaps/", "GET", getLightmap},
-    Route{"/snapshot.png", "GET", getSnapshot},
-    Route{"/snapshots/", "GET", getStoredSnapshot},
-    Route{"/healthz", "GET", getHealth, true},
-    Route{"/readyz", "GET", getReady, true},
-    Route{"/metrics", "GET", getMetrics},
-    Route{protocol::kWebSocketPath, "GET", nullptr},
+    Route{"/assets/", "GET", getViewer, true},  Route{"/favicon.svg", "GET", getViewer, true},
+    Route{"/status", "GET", getStatus},         Route{"/scene", "PUT", putScene},
+    Route{"/uploads", "PUT", putUpload},        Route{"/scene.gltf", "GET", getSceneGltf},
+    Route{"/scene.glb", "GET", getSceneGlb},    Route{"/scene-unlit.glb", "GET", getUnlitGlb},
+    Route{"/sky.hdr", "GET", getSky},           Route{"/lightmaps/", "GET", getLightmap},
+    Route{"/snapshot.png", "GET", getSnapshot}, Route{"/snapshots/", "GET", getStoredSnapshot},
+    Route{"/healthz", "GET", getHealth, true},  Route{"/readyz", "GET", getReady, true},
+    Route{"/metrics", "GET", getMetrics},       Route{protocol::kWebSocketPath, "GET", nullptr},
 };
 
 const Route* routeOf(const HttpRequest& request) {

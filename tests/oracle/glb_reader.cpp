@@ -101,6 +101,11 @@ class Reader {
     const auto& sky = extras["radiositySky"];
     if (sky.is_null()) return;
     scene_.has_sky = true;
+    if (sky.contains("daylight")) warn("daylight is not modelled: its light is missing");
+    if (sky.contains("bufferView"))
+      scene_.sky_map = readSkyMap(file_.bytesOfView(sky["bufferView"].get<std::size_t>()), sky.value("strength", 1.0),
+                                  sky.value("rotation", 0.0) * std::numbers::pi / 180.0);
+    if (!sky.contains("upper")) return;
     scene_.sky_upper = vector3(sky.at("upper"));
     scene_.sky_lower = sky.contains("lower") ? vector3(sky["lower"]) : scene_.sky_upper;
   }

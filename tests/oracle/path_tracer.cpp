@@ -77,7 +77,9 @@ class PathTracer::Scene {
         twins_(flippedTwins(triangles())),
         lamps_(scene.lamps),
         sky_upper_(scene.sky_upper),
-        sky_lower_(scene.sky_lower) {
+        sky_lower_(scene.sky_lower),
+        sky_map_(scene.sky_map) {
+    sky_map_.prepare();
     for (const auto& triangle : triangles()) see_through_ = see_through_ || triangle.see_through;
     gatherLights();
   }
@@ -264,6 +266,24 @@ class PathTracer::Scene {
     return emissionAt(light, y.position) * (there * cos_at / kPi / (density + cos_at / kPi));
   }
 
+  /// The picture of the sky in a direction drawn by its light, weighted against meeting it by a cosine ray.
+  [[nodiscard]] glm::dvec3 mapLight(const Point& at, Random& random) const {
+    const double u = random.uniform(), v = random.uniform();
+    const auto direction = sky_map_.draw(u, v);
+    const double cosine = glm::dot(direction, at.normal) > 0.0 ? glm::dot(direction, at.shading) : 0.0;
+    const double density = sky_map_.density(direction);
+    if (cosine <= 0.0 || density <= 0.0) return glm::dvec3(0.0);
+    if (!seesLamp(at, direction, std::numeric_limits<double>::infinity(), random)) return glm::dvec3(0.0);
+    return sky_map_.radiance(direction) * (cosine / (density + cosine / kPi));
+  }
+
+  /// The other part of that: what a cosine ray that leaves the scene finds.
+  [[nodiscard]] glm::dvec3 mapByCosine(const Point& at, const glm::dvec3& direction) const {
+    if (sky_map_.empty()) return glm::dvec3(0.0);
+    const double cosine = std::max(1e-12, glm::dot(direction, at.shading));
+    return sky_map_.radiance(direction) * (cosine / (sky_map_.density(direction) + cosine / kPi));
+  }
+
   /// One sample of irradiance: H(x) = direct + mean over cosine directions of rho(y) H(y).
   [[nodiscard]] glm::dvec3 path(Point at, const FirstVertex& first, Random& random, Tally& tally) const {
     glm::dvec3 sum(0.0);
@@ -272,12 +292,14 @@ class PathTracer::Scene {
       FirstVertex u = first;
       if (bounce > 0) std::generate(u.begin(), u.end(), [&] { return random.uniform(); });
       sum += throughput * (direct(at, u[0], u[1], u[2], random) + lampLight(at, random));
+      if (!sky_map_.empty()) sum += throughput * mapLight(at, random);
       const auto direction = cosineDirection(at.shading, u[3], u[4]);
       if (glm::dot(direction, at.normal) <= 0.0) return sum;  // into the surface itself
       const auto hit = see_through_ ? traceThrough(at, direction, random) : trace(at, direction);
       if (bounce == 0) count(hit, tally);
-      // The sky is met by cosine rays only: pi times its radiance is the mean over them.
-      if (!hit) return sum + throughput * kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_);
+      // The colours of the sky are met by cosine rays only: pi times their radiance is the mean over them.
+      if (!hit)
+        return sum + throughput * (kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_) + mapByCosine(at, direction));
       if (isBlackBack(*hit)) return sum;
       sum += throughput * metByCosine(at, direction, *hit);
       throughput *= reflectanceAt(triangles()[hit->triangle], hit->point.position);
@@ -375,6 +397,7 @@ class PathTracer::Scene {
   std::vector<std::uint32_t> twins_;  // by triangle: what shows its front where this one turns its back
   std::vector<Lamp> lamps_;
   glm::dvec3 sky_upper_, sky_lower_;
+  SkyMap sky_map_;
   bool see_through_ = false;  // anything
   std::vector<std::size_t> lights_;
   std::vector<double> cumulative_power_;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/oracle/sky.h"
 #include "tests/oracle/texture.h"
 #include "tests/scenes/scene.h"
 
@@ -65,6 +66,7 @@ struct TriangleScene {
   std::vector<Texture> textures;
   std::vector<Lamp> lamps;
   glm::dvec3 sky_upper{0.0}, sky_lower{0.0};  ///< radiance from above and from below the horizon (+Y), nits
+  SkyMap sky_map;                             ///< to be added; empty: none
   bool has_sky = false;                       ///< the file names one, be it black
   std::vector<std::string> node_names;
   std::vector<std::string> warnings;  ///< what the reader does not model, named

@@ -156,6 +156,7 @@ json lightJson(const Light& light) {
   if (isArea(light)) result["size"] = light.kind == Light::Kind::kDisc ? 2.0 * light.radius_m : light.height_m;
   if (light.kind == Light::Kind::kRectangle) result["rect"] = {{"aspect", light.width_m / light.height_m}};
   if (!isArea(light) && light.radius_m > 0.0) result["extras"] = {{"radiosityRadius", light.radius_m}};
+  if (light.angle_deg > 0.0) result["extras"]["radiosityAngle"] = light.angle_deg;
   return result;
 }
 

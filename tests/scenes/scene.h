@@ -41,6 +41,7 @@ struct Light {
   double inner_cone_rad = 0.0, outer_cone_rad = 0.7853981633974483;
   double radius_m = 0.0;                 ///< of a disc; extras.radiosityRadius of a point or spot
   double width_m = 0.0, height_m = 0.0;  ///< of a rectangle: across is at right angles to +Y
+  double angle_deg = 0.0;                ///< extras.radiosityAngle of a directional light
 };
 
 struct Camera {

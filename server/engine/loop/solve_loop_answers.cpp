@@ -10,6 +10,7 @@
 #include "server/engine/publish/framing.h"
 #include "server/engine/publish/picture.h"
 #include "server/engine/publish/quantity_pages.h"
+#include "server/engine/publish/sky_file.h"
 #include "server/scene/lightmap/lightmap.h"
 
 namespace radiosity::engine {
@@ -99,6 +100,15 @@ Result<SharedBytes> SolveLoop::makeUnlit() {
 
 void SolveLoop::unlitGlb(Client client, Callback<SharedBytes> done) {
   askLong<SharedBytes>(client, std::move(done), [this] { return makeUnlit(); });
+}
+
+void SolveLoop::skyPicture(Client client, Callback<SharedBytes> done) {
+  askLong<SharedBytes>(client, std::move(done), [this]() -> Result<SharedBytes> {
+    const auto sky = fromSolveThread([this]() -> Result<scene::Sky> { return lit_->sky(); });
+    if (!sky) return tl::unexpected<Error>(sky.error());
+    if (!sky->picture && !sky->sun) return fail(ErrorCode::kNotFound, "the sky is no picture");
+    return std::make_shared<const Bytes>(hdrOfSky(*sky));
+  });
 }
 
 Result<SharedBytes> SolveLoop::makeExr(std::uint32_t page, Quantity quantity) {

@@ -77,6 +77,7 @@ class SolveLoop final : public Engine {
   void sceneText(Callback<SceneText> done) override;
   void sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) override;
   void unlitGlb(Client client, Callback<SharedBytes> done) override;
+  void skyPicture(Client client, Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) override;
   void texel(TexelRequest request, Callback<Texel> done) override;

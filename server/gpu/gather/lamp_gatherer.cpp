@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
 
 #include "common/task.h"
 #include "server/geometry/way_queue.h"
@@ -25,12 +26,20 @@ glm::dvec2 pointOf(const glm::vec2& at, std::uint32_t turn) {
 /// All of the surface is behind a flat lamp, or beyond its range.
 bool isBeyond(const solver::LampShape& shape, const scene::Surface& surface) {
   const auto &low = surface.bounds_min, &high = surface.bounds_max;
+  if (shape.isFar()) return false;
   const auto nearest = glm::clamp(shape.centre, low, high);
   if (shape.range > 0.0F && glm::distance(nearest, shape.centre) >= shape.range + shape.reach()) return true;
   if (shape.kind == Kind::kBall || shape.kind == Kind::kWeb) return false;
   const glm::vec3 farthest(shape.axis.x > 0.0F ? high.x : low.x, shape.axis.y > 0.0F ? high.y : low.y,
                            shape.axis.z > 0.0F ? high.z : low.z);
   return glm::dot(shape.axis, farthest - shape.centre) <= 0.0F;
+}
+
+/// All of the lamp is behind the plane of a triangle.
+bool turnsAway(const solver::LampShape& shape, const scene::TriangleFrame& frame, float side) {
+  if (shape.kind == Kind::kSky) return false;
+  if (shape.kind == Kind::kSun) return side * glm::dot(frame.normal, shape.axis) <= -shape.half.x;
+  return side * glm::dot(frame.normal, shape.centre - frame.origin) <= -shape.reach();
 }
 
 }  // namespace
@@ -72,8 +81,7 @@ void LampGatherer::lookFrom(const solver::LampShot& shot, const solver::Lamp& la
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
     const auto& frame = patches.triangles[receiver.triangle];
-    const float before = group.side * glm::dot(frame.normal, lamp.shape.centre - frame.origin);
-    if (surface.planar && before <= -lamp.shape.reach()) return;  // all turns away
+    if (surface.planar && turnsAway(lamp.shape, frame, group.side)) return;
     const bool is_point = lamp.shape.kind == Kind::kWeb;
     const float near_mean = is_point ? nearMean(*receivers_, receiver, frame, lamp.shape.centre) : -1.0F;
     const auto turn = Receivers::turnOf(receiver.texel);
@@ -115,8 +123,36 @@ void LampGatherer::gather(const solver::LampShot& shot, std::span<const float> w
   counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// Rays spread evenly over a disk around the box, which the light of each direction crosses.
+LostShare LampGatherer::loseFromFar(const solver::LampShot& shot, const solver::Lamp& lamp, std::uint64_t key) const {
+  const solver::Sobol4 draws(key);
+  const auto centre = 0.5F * (box_[0] + box_[1]);
+  const float radius = 0.5F * glm::distance(box_[0], box_[1]);
+  const auto rayOf = [&](std::uint32_t index) -> LostRay {
+    const auto draw = draws(index);
+    const auto towards = solver::lampRay(lamp, {draw.x, draw.y, 0.0, 0.0}).origin;
+    const auto across = glm::normalize(
+        glm::cross(towards, std::abs(towards.x) < 0.6F ? glm::vec3(1.0F, 0.0F, 0.0F) : glm::vec3(0.0F, 1.0F, 0.0F)));
+    const float far = radius * std::sqrt(static_cast<float>(draw.z));
+    const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.w);
+    const auto aside = far * (std::cos(angle) * across + std::sin(angle) * glm::cross(towards, across));
+    return {{centre + aside + 1.1F * radius * towards, -towards, Receivers::kFar}, 1.0};
+  };
+  const auto rays = lostByRays(*receivers_, key, rayOf, [](float) { return 1.0; });
+  const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / rays.all;
+  std::size_t channel = 0;
+  for (std::size_t c = 1; c < 3; ++c)
+    if (std::abs(shot.intensity[c]) > std::abs(shot.intensity[channel])) channel = c;
+  LostShare lost;
+  lost.all = shot.intensity[channel] != 0.0 ? shot.emitted[channel] / shot.intensity[channel] : 0.0;
+  lost.escaped = lost.all - (rays.all - rays.escaped) * ray_area;
+  lost.absorbed = rays.absorbed * ray_area;
+  return lost;
+}
+
 LostShare LampGatherer::loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp) const {
   const auto key = solver::mixKeys(shot.key, Receivers::placeKey({shot.at[0], 1.0F}));
+  if (lamp.shape.isFar()) return loseFromFar(shot, lamp, key);
   const solver::Sobol4 draws(key);
   const auto middle = 0.5F * (box_[0] + box_[1]);
   const float reach = glm::distance(lamp.shape.centre, middle) + glm::distance(box_[0], box_[1]) + lamp.shape.reach();

@@ -19,7 +19,8 @@ class LampGatherer {
   explicit LampGatherer(std::shared_ptr<const Receivers> receivers)
       : receivers_(std::move(receivers)), box_(solver::sceneBox(receivers_->patches())) {}
 
-  /// `webs` of the whole batch. Cost: up to kMaxReceiverPoints rays a receiver, and some thousand that leave the lamp.
+  /// `webs`, the tables of lamps, of the whole batch. Cost: up to kMaxReceiverPoints rays a receiver, and some thousand
+  /// that leave the lamp.
   void gather(const solver::LampShot& shot, std::span<const float> webs, double flux_scale, const FluxSink& sink,
               solver::TransportCounters& counters);
 
@@ -32,6 +33,7 @@ class LampGatherer {
   class Ways;
   void lookFrom(const solver::LampShot& shot, const solver::Lamp& lamp, const Receivers::Group& group, Ways& ways);
   [[nodiscard]] LostShare loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp) const;
+  [[nodiscard]] LostShare loseFromFar(const solver::LampShot& shot, const solver::Lamp& lamp, std::uint64_t key) const;
 
   std::shared_ptr<const Receivers> receivers_;
   std::array<glm::vec3, 2> box_{};

@@ -21,6 +21,13 @@ bool inside(std::uint32_t first, std::uint32_t count, std::size_t size) {
   return count <= size && first <= size - count;
 }
 
+bool fitsTable(const solver::LampShot& shot, std::span<const float> tables) {
+  if (!shot.shape.hasTable()) return true;
+  if (!inside(shot.first_web, shot.web_size, tables.size())) return false;
+  const auto table = tables.subspan(shot.first_web, shot.web_size);
+  return shot.shape.kind == solver::LampShape::Kind::kSky ? scene::isSkyTable(table) : scene::isWebTable(table);
+}
+
 Result<void> checkPunctual(const ShotSpan& shots) {
   for (std::size_t i = 0; i < shots.point_lights.size(); ++i) {
     const auto& shot = shots.point_lights[i];
@@ -45,11 +52,8 @@ Result<void> checkPunctual(const ShotSpan& shots) {
   }
   for (std::size_t i = 0; i < shots.lamps.size(); ++i) {
     const auto& shot = shots.lamps[i];
-    const bool web_fits = shot.shape.kind != solver::LampShape::Kind::kWeb ||
-                          (inside(shot.first_web, shot.web_size, shots.webs.size()) &&
-                           scene::isWebTable(shots.webs.subspan(shot.first_web, shot.web_size)));
-    if (shot.half <= 1 && goodReceivers(shot.receivers) && web_fits) continue;
-    return fail(ErrorCode::kInternal, "half must be 0 or 1, 1 to 8 receiving points, a web inside the batch",
+    if (shot.half <= 1 && goodReceivers(shot.receivers) && fitsTable(shot, shots.webs)) continue;
+    return fail(ErrorCode::kInternal, "half must be 0 or 1, 1 to 8 receiving points, a table inside the batch",
                 "lamp shot " + std::to_string(i));
   }
   return {};

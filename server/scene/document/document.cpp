@@ -41,7 +41,8 @@ class Loader {
       if (!bytes) return tl::unexpected(bytes.error());
       document_.images.push_back(std::make_shared<const Bytes>(std::move(*bytes)));
     }
-    return photometricFiles();
+    if (auto ok = photometricFiles(); !ok) return ok;
+    return skyPicture();
   }
 
  private:
@@ -122,21 +123,40 @@ class Loader {
       auto bytes = fetch(light, place(document_.name, pointer.to_string() + "/" + std::to_string(i) + "/uri"));
       if (!bytes) return tl::unexpected(bytes.error());
       if (bytes->empty()) return fail(ErrorCode::kInvalidScene, "is empty", place(document_.name, pointer.to_string()));
-      light.erase("uri");
-      light["bufferView"] = count("bufferViews");
       if (!light.contains("mimeType")) {
         const bool is_ies =
             std::string_view(reinterpret_cast<const char*>(bytes->data()), bytes->size()).find("TILT=") !=
             std::string_view::npos;
         light["mimeType"] = is_ies ? "application/x-ies-lm-63" : "application/x-eulumdat";
       }
-      const Json view{{"buffer", count("buffers")}, {"byteLength", bytes->size()}};
-      const Json buffer{{"byteLength", bytes->size()}};
-      document_.gltf["bufferViews"].push_back(view);
-      document_.gltf["buffers"].push_back(buffer);
-      document_.buffers.push_back(std::make_shared<const Bytes>(std::move(*bytes)));
+      moveToBuffer(light, std::move(*bytes));
     }
     return {};
+  }
+
+  /// The same for the picture of /extras/radiositySky.
+  Result<void> skyPicture() {
+    const auto pointer = Json::json_pointer("/extras/radiositySky");
+    if (!document_.gltf.contains(pointer)) return {};
+    auto& sky = document_.gltf.at(pointer);
+    if (!sky.is_object() || !sky.contains("uri") || !sky["uri"].is_string() || sky.contains("bufferView")) return {};
+    const auto where = place(document_.name, pointer.to_string() + "/uri");
+    auto bytes = fetch(sky, where);
+    if (!bytes) return tl::unexpected(bytes.error());
+    if (bytes->empty()) return fail(ErrorCode::kInvalidScene, "is empty", where);
+    moveToBuffer(sky, std::move(*bytes));
+    return {};
+  }
+
+  /// What an object had a URI for lies in a buffer, and a view of all of it.
+  void moveToBuffer(Json& object, Bytes bytes) {
+    object.erase("uri");
+    object["bufferView"] = count("bufferViews");
+    const Json view{{"buffer", count("buffers")}, {"byteLength", bytes.size()}};
+    const Json buffer{{"byteLength", bytes.size()}};
+    document_.gltf["bufferViews"].push_back(view);
+    document_.gltf["buffers"].push_back(buffer);
+    document_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
   }
 
   Document& document_;

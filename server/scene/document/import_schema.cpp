@@ -439,12 +439,14 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 15> kSupported = {"EXT_lights_area",
+constexpr std::array<std::string_view, 17> kSupported = {"EXT_lights_area",
                                                          "EXT_lights_ies",
+                                                         "EXT_lights_image_based",
                                                          "EXT_mesh_gpu_instancing",
                                                          "EXT_meshopt_compression",
                                                          "EXT_texture_webp",
                                                          "KHR_draco_mesh_compression",
+                                                         "KHR_environment_map",
                                                          "KHR_lights_punctual",
                                                          "KHR_materials_emissive_strength",
                                                          "KHR_materials_pbrSpecularGlossiness",

@@ -25,11 +25,12 @@ struct ImportContext {
   DecodedImages& images;       ///< gets those that are used
   Scene& scene;
   ReadWebs& webs;                        ///< gets those that are used
+  ReadSkies& skies;                      ///< gets those that are used
   std::uint64_t claimed_bytes = 0;       ///< of memory, by all but images (scene_memory.h)
   std::set<std::string> webs_told = {};  ///< pointers of the lights whose warnings were told
   /// By index of EXT_lights_ies, those that were met.
   std::map<std::size_t, std::shared_ptr<const ReadWeb>> webs_of_lights = {};
-  std::uint64_t web_bytes = 0;  ///< of their tables
+  std::uint64_t web_bytes = 0;  ///< of their tables, and of the sky
 
   void warn(std::string_view pointer, std::string_view what) {
     scene.warnings.push_back(place(document.name, pointer) + ": " + std::string(what));

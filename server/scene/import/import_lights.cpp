@@ -19,6 +19,8 @@ namespace {
 constexpr double kMaxConeRad = std::numbers::pi / 2;
 /// Metres: a lamp as large as a country is a mistake.
 constexpr double kMostSize = 1e6;
+/// Degrees: light from a wider angle is that of a sky.
+constexpr double kWidestSun = 90.0;
 /// Times the candela of a web, or square metres, it is still a number in single precision.
 constexpr float kBrightest = 1e24F;
 /// Of all directions: a web that shines into less is found by few of the rays that look for its light.
@@ -82,6 +84,9 @@ class LightPlacer {
     const auto radius = radiusOf(lightOf(kPunctual, index), pointer);
     if (!radius) return tl::unexpected(radius.error());
     if (light.kind != LightKind::kDirectional) light.half.x = *radius;
+    const auto angle = angleOf(lightOf(kPunctual, index), pointer);
+    if (!angle) return tl::unexpected(angle.error());
+    if (light.kind == LightKind::kDirectional) light.half.x = *angle;
     return add(std::move(light), pointer);
   }
 
@@ -134,6 +139,16 @@ class LightPlacer {
     if (radius.is_number() && radius.get<double>() >= 0.0 && radius.get<double>() <= kMostSize)
       return radius.get<double>();
     return context_.bad(pointer + "/extras/radiosityRadius", "must be a number of metres in [0, 1e6]");
+  }
+
+  /// Likewise: half of the angle that a directional light comes from, radians; the file has all of it in degrees.
+  [[nodiscard]] Result<double> angleOf(const Json& light, const std::string& pointer) const {
+    const auto extras = light.find("extras");
+    if (extras == light.end() || !extras->is_object() || !extras->contains("radiosityAngle")) return 0.0;
+    const auto& angle = (*extras)["radiosityAngle"];
+    if (angle.is_number() && angle.get<double>() >= 0.0 && angle.get<double>() <= kWidestSun)
+      return angle.get<double>() * std::numbers::pi / 360.0;
+    return context_.bad(pointer + "/extras/radiosityAngle", "must be a number of degrees in [0, 90]");
   }
 
   [[nodiscard]] Result<void> shine(PunctualLight& light, double strength, const std::vector<double>& color,

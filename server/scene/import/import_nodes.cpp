@@ -11,12 +11,12 @@
 #include "server/scene/import/import_lights.h"
 #include "server/scene/import/import_lint.h"
 #include "server/scene/import/import_mesh.h"
+#include "server/scene/import/import_sky.h"
 #include "server/scene/import/node_transform.h"
 
 namespace radiosity::scene {
 namespace {
 
-constexpr double kMaxSkyNits = 1e12;
 constexpr double kMinTexelScale = 1.0 / 64.0, kMaxTexelScale = 64.0;
 
 class NodeWalk {
@@ -179,39 +179,6 @@ class NodeWalk {
   std::string pointer_;
   std::size_t triangles_ = 0;
 };
-
-/// Three finite numbers that are not negative.
-Result<glm::vec3> readColor(const ImportContext& context, const Json& value, const std::string& pointer) {
-  glm::vec3 color(0.0F);
-  bool good = value.is_array() && value.size() == 3;
-  for (std::size_t c = 0; good && c < 3; ++c) {
-    good = value[c].is_number() && value[c].get<double>() >= 0.0 && value[c].get<double>() <= kMaxSkyNits;
-    if (good) color[static_cast<int>(c)] = value[c].get<float>();
-  }
-  if (good) return color;
-  return context.bad(pointer, "must be three numbers in nits, each 0 to 1e12");
-}
-
-/// /extras/radiositySky: our own, so that a sky is part of the scene and can be patched; glTF has no extension for one
-/// that is no picture.
-Result<void> importSky(ImportContext& context) {
-  const auto extras = context.document.gltf.find("extras");
-  if (extras == context.document.gltf.end() || !extras->is_object() || !extras->contains("radiositySky")) return {};
-  const auto& json = (*extras)["radiositySky"];
-  const std::string pointer = "/extras/radiositySky";
-  if (json.is_null()) return {};
-  if (!json.is_object() || !json.contains("upper")) return context.bad(pointer, "must be an object with upper");
-  const auto upper = readColor(context, json["upper"], pointer + "/upper");
-  if (!upper) return tl::unexpected(upper.error());
-  Sky sky{*upper, *upper};
-  if (json.contains("lower")) {
-    const auto lower = readColor(context, json["lower"], pointer + "/lower");
-    if (!lower) return tl::unexpected(lower.error());
-    sky.lower = *lower;
-  }
-  context.scene.sky = sky;
-  return {};
-}
 
 }  // namespace
 

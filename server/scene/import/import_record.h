@@ -41,11 +41,18 @@ struct ReadWeb {
 };
 using ReadWebs = std::map<WebKey, std::shared_ptr<const ReadWeb>>;
 
+/// Pictures of skies, by where their bytes lie, and those of daylight and of extensions by what the document says.
+struct ReadSkies {
+  std::map<WebKey, SharedSkyPicture> pictures;
+  std::map<std::string, SharedSkyPicture> daylights;
+};
+
 struct ImportRecord {
   std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
   std::vector<tinygltf::Material> materials;
   DecodedImages images;              ///< that the materials use
   ReadWebs webs;                     ///< that the lights use
+  ReadSkies skies;                   ///< that the sky uses
   std::uint64_t claimed_bytes = 0;   ///< of memory, by all but images
   std::set<std::string> extensions;  ///< that are used anywhere but in materials
   Scene scene;                       ///< shares what is large with the one that was imported

@@ -34,7 +34,8 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
   if (!parsed) return tl::unexpected(parsed.error());
   record.materials = std::move(parsed->materials);
   record.model = std::make_shared<const tinygltf::Model>(std::move(*parsed));
-  ImportContext context{document, limits, *record.model, record.materials, before, record.images, scene, record.webs};
+  ImportContext context{document,      limits, *record.model, record.materials, before,
+                        record.images, scene,  record.webs,   record.skies};
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
   const auto all = claimOfGeometry(document, *record.model, *claimed, limits);
   if (!all) return tl::unexpected(all.error());
@@ -82,7 +83,8 @@ Result<Scene> importWithOtherMaterials(const Document& document, const ImportRec
   scene.materials.clear();
   scene.textures = {};
   scene.warnings.assign(warned(0), warned(before.warnings.checks));
-  ImportContext context{document, limits, *record.model, record.materials, &before, record.images, scene, record.webs};
+  ImportContext context{document,      limits, *record.model, record.materials, &before,
+                        record.images, scene,  record.webs,   record.skies};
   context.claimed_bytes = before.claimed_bytes;
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   if (scene.materials.size() < before.scene.materials.size())  // that of meshes which name none
@@ -91,6 +93,7 @@ Result<Scene> importWithOtherMaterials(const Document& document, const ImportRec
   scene.warnings.insert(scene.warnings.end(), warned(before.warnings.materials), warned(before.warnings.nodes));
   record.warnings.nodes = scene.warnings.size();
   record.webs = before.webs;
+  record.skies = before.skies;
   record.extensions = before.extensions;
   warnAboutOddities(context, record.extensions);
   return scene;

@@ -16,6 +16,10 @@ namespace radiosity::scene {
 [[nodiscard]] inline bool isBright(const glm::vec3& light) {
   return light.r > 0.0F || light.g > 0.0F || light.b > 0.0F;
 }
+/// Of a sky, but for its sun: what is above the horizon, or below it.
+[[nodiscard]] inline bool isBright(const Sky& sky, bool above) {
+  return isBright(above ? sky.upper : sky.lower) || (sky.picture && sky.strength > 0.0F && sky.picture->shines(above));
+}
 
 /// Whether a material emits anywhere, as far as its factors tell.
 [[nodiscard]] inline bool mayEmit(const Material& material) { return material.emission != glm::vec3(0.0F); }

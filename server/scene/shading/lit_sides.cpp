@@ -250,9 +250,7 @@ class Probe {
     return isFree(at, way / length, static_cast<float>(length));
   }
 
-  [[nodiscard]] bool skyShines(const glm::dvec3& direction) const {
-    return isBright(direction.y > 0.0 ? scene_.sky.upper : scene_.sky.lower);
-  }
+  [[nodiscard]] bool skyShines(const glm::dvec3& direction) const { return isBright(scene_.sky, direction.y > 0.0); }
 
   /// Where a path that met a surface goes on: before the side that it came from. False: that side absorbs.
   [[nodiscard]] bool goOn(const glm::dvec3& direction, const geometry::Hit& hit, Place& at) const {
@@ -421,7 +419,8 @@ class Probe {
 }  // namespace
 
 bool SideScene::shines() const {
-  return isBright(sky.upper) || isBright(sky.lower) || !lights.empty() || std::ranges::find(emits, true) != emits.end();
+  return isBright(sky, true) || isBright(sky, false) || !lights.empty() ||
+         std::ranges::find(emits, true) != emits.end();
 }
 
 std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
@@ -439,6 +438,10 @@ std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3&
     light.range /= scale;
     light.half /= scale;
     lights.push_back(light);
+  }
+  if (scene.sky && scene.sky->sun && isBright(scene.sky->sun->illuminance)) {
+    const auto& sun = *scene.sky->sun;
+    lights.push_back({.kind = LightKind::kDirectional, .direction = -sun.direction, .intensity = sun.illuminance});
   }
   return lights;
 }

@@ -39,7 +39,9 @@ SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& 
 /// Whether `next` has a lamp, a light or a sky where `before` had none.
 bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
   const auto kindled = [](const glm::vec3& was, const glm::vec3& is) { return !isBright(was) && isBright(is); };
-  if (kindled(sky_before.upper, sky_next.upper) || kindled(sky_before.lower, sky_next.lower)) return true;
+  for (const bool above : {true, false})
+    if (!isBright(sky_before, above) && isBright(sky_next, above)) return true;
+  if (sky_next.sun && sky_next.sun != sky_before.sun && isBright(sky_next.sun->illuminance)) return true;
   for (std::size_t m = 0; m < next.materials.size(); ++m) {
     const auto was = m < before.materials.size() ? before.materials[m].emission : glm::vec3(0.0F);
     if (kindled(was, next.materials[m].emission)) return true;
@@ -88,7 +90,7 @@ bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky&
   const auto sides = sideSceneOf(patches, next, sky_next);
   // Photons find what a lamp lights; only the sky and the sun send none.
   const auto isSun = [](const PunctualLight& light) { return light.kind == LightKind::kDirectional; };
-  const bool far = isBright(sky_next.upper) || isBright(sky_next.lower) || std::ranges::any_of(next.lights, isSun);
+  const bool far = isBright(sky_next, true) || isBright(sky_next, false) || std::ranges::any_of(sides.lights, isSun);
   const auto at_hand = tree ? tree() : nullptr;
   const auto light =
       lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone, at_hand.get());

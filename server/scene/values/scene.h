@@ -15,6 +15,7 @@
 
 #include "common/shared_list.h"
 #include "server/scene/values/light_web.h"
+#include "server/scene/values/sky_picture.h"
 
 namespace radiosity::scene {
 
@@ -112,18 +113,33 @@ struct PunctualLight {
   double outer_cone_rad = 0.785398163;
   glm::dvec3 across{1.0, 0.0, 0.0};  ///< of a rectangle, along its width; of a web, where the azimuth is 0
   /// Metres, of a rectangle's width and height. The first is the radius of a disc, of the ball that a point light is,
-  /// and of the disc that a spot is; 0: they have no size.
+  /// and of the disc that a spot is; 0: they have no size. Of a directional light: half of the angle, in radians,
+  /// within which its light comes.
   glm::dvec2 half{0.0};
   SharedWeb web = {};
 
   bool operator==(const PunctualLight&) const = default;
 };
 
-/// Radiance of everything outside the scene, nits: one colour above the horizon (+Y), one below it. Without anything in
-/// between, a surface whose normal makes the angle theta with +Y receives pi (upper (1 + cos theta) + lower (1 - cos
-/// theta)) / 2 lux.
+/// A sun: light from within a small angle around a direction, evenly.
+struct SkySun {
+  glm::dvec3 direction{0.0, 1.0, 0.0};  ///< towards it, unit length
+  glm::vec3 illuminance{0.0F};          ///< lux, on a plane that faces it
+  double diameter_rad = 0.0;            ///< as it is seen; 0: all from one direction
+
+  bool operator==(const SkySun&) const = default;
+};
+
+/// Radiance of everything outside the scene, nits, the sum of: one colour above the horizon (+Y) and one below it, a
+/// picture, and a sun. Of the colours, without anything in between, a surface whose normal makes the angle theta with
+/// +Y receives pi (upper (1 + cos theta) + lower (1 - cos theta)) / 2 lux.
 struct Sky {
   glm::vec3 upper{0.0F}, lower{0.0F};
+  SharedSkyPicture picture = {};
+  float strength = 1.0F;  ///< that the picture is multiplied by
+  double turn_rad = 0.0;  ///< of the picture, about +Y: from +Z towards +X
+  std::optional<SkySun> sun = std::nullopt;
+
   bool operator==(const Sky&) const = default;
 };
 
@@ -134,7 +150,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Camera> cameras;
   std::vector<PunctualLight> lights;
-  std::optional<Sky> sky;               ///< /extras/radiositySky
+  std::optional<Sky> sky;               ///< /extras/radiositySky, or of an extension
   std::vector<std::string> warnings;    ///< "room.glb: /materials/3: ..." in the order found
   std::uint64_t triangles_dropped = 0;  ///< zero-area, non-finite or duplicate triangles left out
 };

@@ -210,8 +210,7 @@ class CrowdSample::Receiver {
       const double distance = glm::length(way);
       auto end = place_;
       const auto value = rays_.see(place_, way / distance, mixKeys(key_, i), end);
-      const bool open = value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow ||
-                        glm::distance(end.position, glm::dvec3(from_)) >= distance - kAtLamp;
+      const bool open = LeafRays::isSky(value) || glm::distance(end.position, glm::dvec3(from_)) >= distance - kAtLamp;
       sum += open ? brings_[i] : 0.0;
     }
     return sum;
@@ -331,7 +330,7 @@ void CrowdSample::findLost(LinkSample& links) const {
                                scene::kNone};
     auto end = from;
     const auto seen = rays_.see(from, cosineDirection(from.normal, direction.x, direction.y), mixKeys(key_, i), end);
-    if (seen == LeafRays::kSkyAbove || seen == LeafRays::kSkyBelow) ++escaped;
+    if (LeafRays::isSky(seen)) ++escaped;
     if (seen == LeafRays::kNothing) ++absorbed;
   }
   links.escaped = crowd_.area * escaped / kLostRays;

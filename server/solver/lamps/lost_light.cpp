@@ -35,6 +35,19 @@ glm::dvec3 inCap(const glm::dvec3& axis, double least, double u, double v) {
   return cosine * axis + sine * (std::cos(kTwoPi * v) * s + std::sin(kTwoPi * v) * t);
 }
 
+/// Of its picture, all of it, and its sun.
+std::vector<PunctualLights::Source> lampsOfSky(const scene::PatchScene& patches, scene::Sky sky) {
+  sky.upper = sky.lower = glm::vec3(0.0F);
+  PunctualLights lights(patches, {}, {});
+  lights.setRaysSeeSky(false);
+  return lights.makeSources(patches, {{}, sky});
+}
+
+glm::dvec3 towards(const PunctualLights::Source& source, const glm::dvec2& at) {
+  if (source.kind == PunctualLights::Source::Kind::kDirectional) return glm::dvec3(source.direction);
+  return glm::dvec3(lampRay(source.lamp(), {at.x, at.y, 0.0, 0.0}).origin);
+}
+
 }  // namespace
 
 std::vector<double> fluxes(const scene::PatchScene& patches, const LightSources& sources) {
@@ -49,6 +62,9 @@ std::vector<double> fluxes(const scene::PatchScene& patches, const LightSources&
   for (const auto& light : sources.lights) add({{light}, {}});
   add({{}, {sources.sky.upper, glm::vec3(0.0F)}});
   add({{}, {glm::vec3(0.0F), sources.sky.lower}});
+  auto rest = sources.sky;
+  rest.upper = rest.lower = glm::vec3(0.0F);
+  add({{}, rest});
   return each;
 }
 
@@ -120,7 +136,7 @@ LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, std::uint32_
 bool LostLight::follow(const Ray& ray, std::uint64_t key, double range, Fate& fate) const {
   LeafRays::Place end;
   const auto seen = rays_->see(ray.from, ray.direction, key, end);
-  if (seen == LeafRays::kSkyAbove || seen == LeafRays::kSkyBelow) {
+  if (LeafRays::isSky(seen)) {
     ++fate.sky;
   } else if (range > 0.0 && glm::distance(end.position, ray.from.position) > range) {
     ++fate.beyond;
@@ -180,16 +196,23 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
   }
   const auto first_light = number;
   const auto first_sky = first_light + static_cast<std::uint32_t>(sources.lights.size());
-  for (const double flux : fluxes(patches_, sources)) senders.add(number++, flux);
+  auto powers = fluxes(patches_, sources);
+  powers.pop_back();
+  for (const double flux : powers) senders.add(number++, flux);
+  const auto first_lamp = number;
+  const auto lamps = lampsOfSky(patches_, sources.sky);
+  for (const auto& lamp : lamps)
+    senders.add(number++, lamp.flux_per_intensity * glm::dot(lamp.intensity, glm::dvec3(1.0)));
   std::map<std::uint32_t, std::uint32_t> met;  // by instance
   std::uint32_t all = 0;
   for (std::uint32_t i = 0; i < kBackRays && !senders.empty(); ++i) {
     const auto sender = senders.at((i + 0.5) / kBackRays);
     const auto at = sobol4(i, kKey);
     const auto up = glm::dvec3(0.0, sender == first_sky ? 1.0 : -1.0, 0.0);
-    const auto ray = sender < first_light ? ofLeaf(sender, i, kKey)
-                     : sender < first_sky ? ofLamp(sources.lights[sender - first_light], i, kKey)
-                                          : fromFar(inCap(up, 0.0, at.z, at.w), at.x, at.y);
+    const auto ray = sender < first_light  ? ofLeaf(sender, i, kKey)
+                     : sender < first_sky  ? ofLamp(sources.lights[sender - first_light], i, kKey)
+                     : sender < first_lamp ? fromFar(inCap(up, 0.0, at.z, at.w), at.x, at.y)
+                                           : fromFar(towards(lamps[sender - first_lamp], {at.z, at.w}), at.x, at.y);
     if (!(ray.weight > 0.0)) continue;
     Fate fate;
     (void)follow(ray, mixKeys(kKey, i), 0.0, fate);

@@ -15,8 +15,8 @@
 
 namespace radiosity::solver {
 
-/// Flux of each light, and then of the upper and the lower half of the sky, all channels, lux unit^2. A pass over the
-/// vertices, and O(1) a light.
+/// Flux of each light, and then of the upper and the lower half of the sky, and of its picture and sun together, all
+/// channels, lux unit^2. A pass over the vertices, and O(1) a light.
 [[nodiscard]] std::vector<double> fluxes(const scene::PatchScene& patches, const LightSources& sources);
 
 class LostLight {
@@ -54,7 +54,7 @@ class LostLight {
     glm::dvec3 direction;
     double weight = 1.0;  ///< 0: nothing is sent there
   };
-  /// What sends light, by its flux: leaves, then lights, then the two halves of the sky.
+  /// What sends light, by its flux: leaves, then lights, then the two halves of the sky, then its lamps.
   class Senders;
   [[nodiscard]] Ray ofLeaf(std::uint32_t value, std::uint32_t index, std::uint64_t key) const;
   [[nodiscard]] Ray ofLamp(const scene::PunctualLight& light, std::uint32_t index, std::uint64_t key) const;

@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "server/solver/lamps/lamp_of_light.h"
+#include "server/solver/lamps/sky_sources.h"
 #include "server/solver/math/sampling.h"
 
 namespace radiosity::solver {
@@ -23,6 +24,8 @@ constexpr std::uint32_t kMostPointPixels = 512, kMostParallelPixels = 2048;
 
 /// A point light this far away (unit box) is a directional one: its irradiance differs by 2e-4 at most over the scene.
 constexpr double kFar = 1.0e4;
+/// A narrower sun (rad) is a direction: its half shadow, a box wide, is thinner than what positions are rounded to.
+constexpr double kLeastSun = 1.0e-6;
 
 /// Pixels across `extent` that are half as large as a leaf of middling size; a power of two.
 std::uint32_t pixelsForLeaves(const scene::PatchScene& patches, float extent) {
@@ -138,7 +141,9 @@ bool PunctualLights::Source::sameShape(const Source& other) const {
 
 Lamp PunctualLights::Source::lamp() const {
   static const std::array<float, 7> black{2.0F, 1.0F, 0.0F, 180.0F, 0.0F, 0.0F, 0.0F};
-  return {shape, web ? std::span<const float>(*web) : std::span<const float>(black)};
+  static const std::array<float, 9> dark{1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.0F};
+  const auto none = shape.kind == LampShape::Kind::kSky ? std::span<const float>(dark) : std::span<const float>(black);
+  return {shape, web ? std::span<const float>(*web) : none};
 }
 
 std::uint64_t PunctualLights::Source::shapeKey() const {
@@ -147,6 +152,7 @@ std::uint64_t PunctualLights::Source::shapeKey() const {
        {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale, cone_offset, range}) {
     key = mixKeys(key, std::bit_cast<std::uint32_t>(value));
   }
+  if (kind == Kind::kSky && web) return mixKeys(key, web_key);
   if (kind != Kind::kLamp) return key;
   key = mixKeys(mixKeys(key, web_key), static_cast<std::uint64_t>(shape.kind));
   for (const float value : {shape.axis.x, shape.axis.y, shape.axis.z, shape.across.x, shape.across.y, shape.across.z,
@@ -165,7 +171,7 @@ PunctualLights::PunctualLights(const scene::PatchScene& patches, const LightSour
 
 PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patches,
                                                  const scene::PunctualLight& light) const {
-  if (light.kind == scene::LightKind::kDirectional) return makeDirectional(light.intensity, -light.direction);
+  if (light.kind == scene::LightKind::kDirectional) return makeSun(light.intensity, -light.direction, light.half.x);
   Source source;
   const glm::dvec3 position = (light.position - patches.centre) / patches.scale;
   source.intensity = glm::dvec3(light.intensity) / (patches.scale * patches.scale);
@@ -236,6 +242,18 @@ PunctualLights::Source PunctualLights::makeDirectional(const glm::dvec3& irradia
   return source;
 }
 
+/// `radius_rad`: half of the angle that its light comes from; 0: from one direction.
+PunctualLights::Source PunctualLights::makeSun(const glm::dvec3& illuminance, const glm::dvec3& towards,
+                                               double radius_rad) const {
+  auto source = makeDirectional(illuminance, towards);
+  if (radius_rad < kLeastSun) return source;
+  source.kind = Source::Kind::kLamp;
+  source.shape.kind = LampShape::Kind::kSun;
+  source.shape.axis = source.direction;
+  source.shape.half.x = static_cast<float>(std::sin(radius_rad));
+  return source;
+}
+
 PunctualLights::Source PunctualLights::makeSky(const glm::vec3& radiance, float up) const {
   Source source;
   source.kind = Source::Kind::kSky;
@@ -265,6 +283,9 @@ std::vector<PunctualLights::Source> PunctualLights::makeSources(const scene::Pat
   for (const auto& light : sources.lights) add(makeLight(patches, light));
   add(makeSky(sources.sky.upper, 1.0F));
   add(makeSky(sources.sky.lower, -1.0F));
+  if (const auto& sun = sources.sky.sun)
+    add(makeSun(glm::dvec3(sun->illuminance), sun->direction, 0.5 * sun->diameter_rad));
+  for (const auto& source : pictureSources(sources.sky, box_, settings_.rays_see_sky)) add(source);
   return made;
 }
 
@@ -363,10 +384,12 @@ void PunctualLights::addLamp(const Task& task, ShotBatch& batch) const {
   const auto lamp = source.lamp();
   LampShot shot;
   shot.shape = lamp.shape;
-  if (lamp.shape.kind == LampShape::Kind::kWeb) {
-    shot.first_web = static_cast<std::uint32_t>(batch.webs.size());
+  if (lamp.shape.hasTable()) {
     shot.web_size = static_cast<std::uint32_t>(lamp.web.size());
-    batch.webs.insert(batch.webs.end(), lamp.web.begin(), lamp.web.end());
+    const bool is_last = batch.webs.size() >= lamp.web.size() &&
+                         std::equal(lamp.web.begin(), lamp.web.end(), batch.webs.end() - shot.web_size);
+    if (!is_last) batch.webs.insert(batch.webs.end(), lamp.web.begin(), lamp.web.end());
+    shot.first_web = static_cast<std::uint32_t>(batch.webs.size()) - shot.web_size;
   }
   shot.half = task.half;
   shot.key = mixKeys(key, 3);

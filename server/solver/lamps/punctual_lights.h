@@ -38,23 +38,26 @@ struct PunctualSettings {
   std::uint32_t sky_directions = 64;  ///< of either hemisphere of the sky, each round and half
   std::uint32_t views_a_shot = 8;     ///< sky directions carried together
   std::uint32_t images_a_slice = 32;  ///< so many images make one batch
+  bool rays_see_sky = true;           ///< pictures of the sky are lamps only where they are bright; false: all of them
 };
 
 class PunctualLights {
  public:
-  /// One light, or one hemisphere of the sky.
+  /// One light, one hemisphere of the sky, or a picture of it.
   struct Source {
     enum class Kind { kPoint, kSpot, kDirectional, kSky, kLamp } kind = Kind::kPoint;
     glm::vec3 position{0.0F};   ///< unit box
     glm::vec3 direction{0.0F};  ///< axis of a spot; towards the light, or to the middle of the hemisphere
     float cone_scale = 0.0F, cone_offset = 1.0F, range = 0.0F;
-    glm::dvec3 intensity{0.0};                      ///< lux unit^2 / sr; lux; of the sky radiance, nits
-    double flux_per_intensity = 0.0;                ///< unit^2 sr; unit^2
-    std::uint64_t key = 0;                          ///< of its sample sequences
-    glm::dvec3 delivered{0.0};                      ///< intensity of every sequence played
-    std::uint32_t sequences = 0;                    ///< played so far: 0 .. sequences - 1
-    LampShape shape;                                ///< of a kLamp
-    std::shared_ptr<const std::vector<float>> web;  ///< of a kLamp that has one: LightWeb::table
+    glm::dvec3 intensity{0.0};        ///< lux unit^2 / sr; lux; of the sky radiance, nits
+    double flux_per_intensity = 0.0;  ///< unit^2 sr; unit^2
+    std::uint64_t key = 0;            ///< of its sample sequences
+    glm::dvec3 delivered{0.0};        ///< intensity of every sequence played
+    std::uint32_t sequences = 0;      ///< played so far: 0 .. sequences - 1
+    LampShape shape;                  ///< of a kLamp
+    /// Of a kLamp that has one: LightWeb::table, or that of a sky. Of a kSky that is a picture: its radiance by cell
+    /// (SkyCells), three numbers each, for an intensity of one.
+    std::shared_ptr<const std::vector<float>> web;
     std::uint64_t web_key = 0;
 
     /// All but intensity: what sample sequences depend on.
@@ -62,6 +65,7 @@ class PunctualLights {
     [[nodiscard]] std::uint64_t shapeKey() const;
     /// Of a kLamp. Where the web is not known any more (a dark lamp of before a restart) it is black.
     [[nodiscard]] Lamp lamp() const;
+    [[nodiscard]] bool isPicture() const { return kind == Kind::kSky && web != nullptr; }
 
     template <typename Archive, typename Self>
     static void visit(Archive& archive, Self& self) {
@@ -79,6 +83,9 @@ class PunctualLights {
   /// to the batch. The sources count as delivered as soon as a round is planned, by the first call.
   void addSlice(std::uint32_t rounds, ShotBatch& batch);
   [[nodiscard]] bool hasSlice(std::uint32_t rounds) const { return next_ < pending_.size() || owed(rounds) > 0.0; }
+
+  /// Whether rays of reflected light see the sky.
+  void setRaysSeeSky(bool see) { settings_.rays_see_sky = see; }
 
   /// Lights in one place are one source; dark ones are left out.
   [[nodiscard]] std::vector<Source> makeSources(const scene::PatchScene& patches, const LightSources& sources) const;
@@ -104,6 +111,7 @@ class PunctualLights {
                                 const Source& spot) const;
   [[nodiscard]] Source makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const;
   [[nodiscard]] Source makeSky(const glm::vec3& radiance, float up) const;
+  [[nodiscard]] Source makeSun(const glm::dvec3& illuminance, const glm::dvec3& towards, double radius_rad) const;
   /// What a sequence of one source delivers to one half.
   struct Task {
     Source source;

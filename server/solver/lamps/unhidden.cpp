@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numbers>
+#include <span>
 
 #include "server/solver/math/polygon_form_factor.h"
 
@@ -47,14 +47,6 @@ double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Plac
   if (source.range > 0.0F)
     strength *= std::clamp(1.0 - std::pow(distance / static_cast<double>(source.range), 4.0), 0.0, 1.0);
   return strength * cosine / (distance * distance);
-}
-
-glm::vec3 skyRadiosity(bool above, std::span<const PunctualLights::Source> sources) {
-  glm::dvec3 sum(0.0);
-  for (const auto& source : sources) {
-    if (source.kind == Kind::kSky && (source.direction.y > 0.0F) == above) sum += std::numbers::pi * source.intensity;
-  }
-  return glm::vec3(sum);
 }
 
 }  // namespace radiosity::solver

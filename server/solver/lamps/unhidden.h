@@ -3,7 +3,6 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <span>
 
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/patches/lights.h"
@@ -21,8 +20,5 @@ namespace radiosity::solver {
 
 /// Irradiance for an intensity of one; 0 of the sky, which rays see where they end.
 [[nodiscard]] double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place);
-
-/// Of what of the sky is above the horizon, or below it: lm/m^2 for the whole hemisphere.
-[[nodiscard]] glm::vec3 skyRadiosity(bool above, std::span<const PunctualLights::Source> sources);
 
 }  // namespace radiosity::solver

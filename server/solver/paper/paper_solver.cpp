@@ -36,6 +36,7 @@ glm::dvec3 emittedBy(const ShotBatch& batch) {
 PunctualLights lightsOf(const scene::PatchScene& patches, const LightSources& sources, std::uint64_t seed) {
   PunctualSettings settings;
   settings.seed = seed;
+  settings.rays_see_sky = false;
   return {patches, sources, settings};
 }
 

@@ -167,7 +167,9 @@ LeftLight LinkedSolver::leftLight() const {
   light.emission = shiningOfLeaves();
   light.reflectance = ofLeaves(system_.reflectance());
   light.irradiance = over_links_;
-  for (const auto& source : sky_) light.sky[source.direction.y > 0.0F ? 0 : 1] += std::numbers::pi * source.intensity;
+  SkyLight sky(sky_);
+  light.sky = sky.hemispheres;
+  light.sky_cells = std::move(sky.cells);
   for (auto& shot : light.shot) shot.assign(light.emission.size(), glm::vec3(0.0F));
   for (const auto& shooter : system_.shooters()) {
     if (shooter.isLight()) continue;

@@ -60,8 +60,9 @@ bool LinkedSolver::withLeafLight(const std::function<bool(const LeafLight&)>& wo
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
+  const SkyLight sky(sources);
   return work(
-      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr});
+      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr, &sky});
 }
 
 /// What is to be reached by links, beside what varies within leaves.

@@ -13,7 +13,7 @@ namespace {
 
 /// A node shines from so many of its leaves.
 constexpr std::uint32_t kNodeLeaves = 16;
-/// A crowd from so many of its lamps.
+/// A crowd from so many of its lamps, and a sky from so many directions.
 constexpr std::uint32_t kCrowdLamps = 64;
 /// What leaves lack is known so badly that a larger factor would be one of noise.
 constexpr float kMostFactor = 4.0F;
@@ -29,6 +29,15 @@ ShadingEmitter emitterOf(const LightPolygon& light) {
 ShadingEmitter emitterOf(const PunctualLights::Source& source) {
   using Kind = PunctualLights::Source::Kind;
   ShadingEmitter emitter;
+  if (source.kind == Kind::kLamp && source.shape.kind == LampShape::Kind::kSky) {
+    emitter.kind = ShadingEmitter::Kind::kDirections;
+    for (std::uint32_t k = 0; k < kCrowdLamps; ++k) {
+      const glm::dvec2 at((k % 8 + 0.5) / 8.0, (k / 8 + 0.5) / 8.0);
+      const glm::dvec3 towards(lampRay(source.lamp(), {at.x, at.y, 0.0, 0.0}).origin);
+      emitter.patches.push_back({towards, -towards, 1.0});
+    }
+    return emitter;
+  }
   if (source.kind == Kind::kLamp && source.shape.isFlat()) {
     emitter.kind = ShadingEmitter::Kind::kPatches;
     for (std::uint32_t k = 0; k < kNodeLeaves; ++k) {
@@ -37,7 +46,8 @@ ShadingEmitter emitterOf(const PunctualLights::Source& source) {
     }
     return emitter;
   }
-  const bool is_point = source.kind == Kind::kLamp || source.kind == Kind::kPoint || source.kind == Kind::kSpot;
+  const bool is_lamp = source.kind == Kind::kLamp && !source.shape.isFar();
+  const bool is_point = is_lamp || source.kind == Kind::kPoint || source.kind == Kind::kSpot;
   emitter.kind = is_point                    ? ShadingEmitter::Kind::kPoint
                  : source.kind == Kind::kSky ? ShadingEmitter::Kind::kSky
                                              : ShadingEmitter::Kind::kDirection;

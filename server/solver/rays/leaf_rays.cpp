@@ -204,7 +204,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
                    ? *std::exchange(first, nullptr)
                    : rays_.nearest({glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), from.triangle},
                                    std::span(passed).first(sheets));
-    if (!hit.found()) return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+    if (!hit.found()) return kSky + SkyCells::of(direction);
     const auto at = origin + static_cast<double>(hit.t) * direction;
     if (starts < kMostStarts && passes(hit, at, key)) {
       passed[sheets] = hit.triangle;  // those that lie in the same place count, too
@@ -257,7 +257,7 @@ bool LeafRays::uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {
   auto sight = look(from, direction, kFar);
-  if (sight.distance >= kFar) sight.end.value = direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+  if (sight.distance >= kFar) sight.end.value = kSky + SkyCells::of(direction);
   return sight;
 }
 

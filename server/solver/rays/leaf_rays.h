@@ -14,14 +14,17 @@
 #include "server/geometry/bounds.h"
 #include "server/geometry/ray_scene.h"
 #include "server/scene/values/patch_scene.h"
+#include "server/solver/math/sky_cells.h"
 #include "server/solver/patches/side.h"
 
 namespace radiosity::solver {
 
 class LeafRays {
  public:
-  /// Instead of leaf values: nothing that sends light, or the sky.
-  static constexpr std::uint32_t kNothing = scene::kNone, kSkyAbove = scene::kNone - 1, kSkyBelow = scene::kNone - 2;
+  /// Instead of leaf values: nothing that sends light, or a cell of the sky (SkyCells), the first of which is kSky.
+  static constexpr std::uint32_t kNothing = scene::kNone, kSky = scene::kNone - SkyCells::kCount;
+  [[nodiscard]] static bool isSky(std::uint32_t value) { return value >= kSky && value != kNothing; }
+  [[nodiscard]] static bool isSkyAbove(std::uint32_t value) { return isSky(value) && SkyCells::isAbove(value - kSky); }
 
   /// A place on the lit side of a leaf; unit box.
   struct Place {

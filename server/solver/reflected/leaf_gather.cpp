@@ -131,6 +131,7 @@ void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
 
 void LeafGather::begin(LeftLight light) {
   light_ = std::move(light);
+  if (!light_.sky_cells.empty()) sights_.tellCells();
   stage_ = Stage::kTracing;
 }
 
@@ -204,10 +205,7 @@ void LeafGather::takeLight(std::size_t h) {
   const std::size_t leaves = sights_.leafCount();
   half.source.assign(sights_.endCount(), {});
   half.radiosity.assign(sights_.endCount() + sights_.steps(h).size(), {});
-  for (std::size_t c = 0; c < 3; ++c) {
-    half.source[sights_.skyAbove()][c] = light_.sky[0][static_cast<int>(c)];
-    half.source[sights_.skyBelow()][c] = light_.sky[1][static_cast<int>(c)];
-  }
+  takeSky(h);
   half.arriving.assign(leaves, {});
   std::vector<SourceSum> sums(sides_.size());
   takeSources(h, sums);
@@ -225,6 +223,30 @@ void LeafGather::takeLight(std::size_t h) {
   }
   half.gmres.begin(evenLight(h, sums), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
   half.done = false;
+}
+
+/// What each end in the sky shines with, and where its cells do, what the rays of each leaf bring of it: the mean over
+/// those that end there.
+void LeafGather::takeSky(std::size_t h) {
+  auto& half = halves_[h];
+  const auto first = sights_.firstOfSky(), count = sights_.skyCount();
+  const bool has_cells = light_.sky_cells.size() == count;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto& hemisphere = light_.sky[2 * i < count ? 0 : 1];
+    for (int c = 0; c < 3; ++c)
+      half.source[first + i][static_cast<std::size_t>(c)] =
+          hemisphere[c] + (has_cells ? static_cast<double>(light_.sky_cells[i][c]) : 0.0);
+  }
+  if (!has_cells || lost_[h].empty()) return;
+  half.sky.assign(sights_.leafCount(), {});
+  inLeaves(sights_.leafCount(), [&](std::size_t v) {
+    if (!lost_[h].hasAny(v)) return;
+    const auto seen = sights_.seen(h, static_cast<std::uint32_t>(v));
+    Light sum{};
+    for (const auto end : seen)
+      if (sights_.isSky(end)) addTo(sum, half.source[end]);
+    for (std::size_t c = 0; c < 3; ++c) half.sky[v][c] = static_cast<float>(sum[c] / static_cast<double>(seen.size()));
+  });
 }
 
 void LeafGather::average(std::size_t half) {

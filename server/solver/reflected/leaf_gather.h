@@ -44,6 +44,7 @@ struct LeftLight {
   std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
   std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
   std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
+  std::vector<glm::vec3> sky_cells;                  ///< the same by cell of SkyCells, to be added; empty: none
   double residual = 4e-4;                            ///< that may be left, of all that is gathered
 };
 
@@ -158,6 +159,7 @@ class LeafGather {
     std::vector<Light> source;       ///< r; by what may be seen (LeafSights::endCount)
     std::vector<Light32> radiosity;  ///< r + rho x; and then by step
     std::vector<Light32> arriving;   ///< its means
+    std::vector<Light32> sky;        ///< by leaf: what its rays bring from cells of the sky; empty: none shines
     RayGmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
@@ -261,7 +263,8 @@ class LeafGather {
     const auto rays = lost_[half].at(value);
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
-  [[nodiscard]] Light skyAt(const Lost& lost) const;
+  [[nodiscard]] Light skyAt(std::size_t half, std::size_t value, const Lost& lost) const;
+  void takeSky(std::size_t half);
   [[nodiscard]] const Light& lossOf(std::size_t half, std::uint32_t value) const;
   bool is_weighed_ = false;  ///< the following are known
   std::optional<LeafSmoother> smoother_;

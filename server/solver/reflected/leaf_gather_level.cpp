@@ -64,9 +64,11 @@ void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
           join(sights_.sideOf(steps[end - sights_.endCount()].by));
           joinSteps(half, end, parts);
         } else {
-          if (end == sights_.skyAbove()) ++lost.above;
-          if (end == sights_.skyBelow()) ++lost.below;
-          if (sights_.isAbsorbed(end)) ++lost.absorbed;
+          if (sights_.isAbsorbed(end)) {
+            ++lost.absorbed;
+          } else {
+            ++(sights_.isSkyAbove(end) ? lost.above : lost.below);
+          }
         }
       }
       lost_[half].add(v, lost);
@@ -95,10 +97,12 @@ inline __attribute__((always_inline)) LeafGather::Light LeafGather::solved(std::
 }
 
 /// What comes straight from the sky, by rays as they are.
-inline __attribute__((always_inline)) LeafGather::Light LeafGather::skyAt(const Lost& lost) const {
+inline __attribute__((always_inline)) LeafGather::Light LeafGather::skyAt(std::size_t h, std::size_t v,
+                                                                          const Lost& lost) const {
   Light light{};
   const auto above = static_cast<double>(lost.above), below = static_cast<double>(lost.below);
   if (above + below <= 0.0) return light;
+  if (const auto& sky = halves_[h].sky; !sky.empty()) return {sky[v][0], sky[v][1], sky[v][2], 0.0};
   for (std::size_t c = 0; c < 3; ++c)
     light[c] = above * light_.sky[0][static_cast<int>(c)] + below * light_.sky[1][static_cast<int>(c)];
   return light;
@@ -228,7 +232,7 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
       const auto emission = lightOf(light_.emission[v]), reflectance = lightOf(light_.reflectance[v]);
       const auto over_links = lightOf(light_.irradiance[h][v]), shot = lightOf(light_.shot[h][v]);
       const auto lost = lostOf(h, v);
-      const auto sky = skyAt(lost);
+      const auto sky = skyAt(h, v, lost);
       const double sends = 1.0 - lost.all();
       auto& source = halves_[h].source[v];
       for (std::size_t c = 0; c < 4; ++c) {
@@ -327,7 +331,7 @@ RADIOSITY_CLONES void LeafGather::addLevels(std::size_t h, std::span<LevelSum> s
       const auto over_links = lightOf(light_.irradiance[h][v]);
       const auto& source = halves_[h].source[v];
       const auto lost = lostOf(h, v);
-      const auto sky = skyAt(lost);
+      const auto sky = skyAt(h, v, lost);
       const auto& loss = lossOf(h, v);
       for (std::size_t c = 0; c < 4; ++c) {
         const double sends = 1.0 - loss[c] * lost.all();
@@ -405,7 +409,7 @@ void LeafGather::weighLost() {
       const auto lost = lostOf(half, v);
       if (lost.all() <= 0.0) continue;
       const auto& loss = lossOf(half, v);
-      const auto sky = skyAt(lost);
+      const auto sky = skyAt(half, v, lost);
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = 0.5 * areaOf(v) * static_cast<double>(halves_[half].radiosity[v][c]) * loss[c];
         escaped_[c] += flux * lost.escaped();

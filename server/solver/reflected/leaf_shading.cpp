@@ -152,6 +152,9 @@ double shadedPart(const ShadingEmitter& emitter, std::span<const ShadedPlace> pl
       case Kind::kPatches:
         sum.add(fromPatches(place, emitter.patches));
         break;
+      case Kind::kDirections:
+        for (const auto& patch : emitter.patches) sum.add(along(place, patch.position, patch.area));
+        break;
     }
   }
   return sum.geometric > 0.0 ? sum.shading / sum.geometric : 1.0;

@@ -68,6 +68,7 @@ struct ShadingEmitter {
     kDirection,  ///< `at`: towards it, unit length
     kSky,        ///< the hemisphere around `at`, evenly
     kPatches,    ///< `patches`
+    kDirections  ///< the positions of `patches`: directions, unit length
   } kind = Kind::kPolygon;
   std::span<const glm::vec3> corners;
   glm::dvec3 at{0.0};

@@ -143,11 +143,10 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, const glm::dvec3& dire
     place = there;
     seen = rays_->see(place, cosineDirection(place.normal, draw.x, draw.y), key, there);
   }
-  std::uint32_t end = seen == LeafRays::kSkyAbove   ? skyAbove()
-                      : seen == LeafRays::kSkyBelow ? skyBelow()
-                      : at_once                     ? absorbedAtOnce()
-                      : seen == LeafRays::kNothing  ? absorbed()
-                                                    : seen;
+  std::uint32_t end = LeafRays::isSky(seen)        ? skyEnd(seen - LeafRays::kSky)
+                      : at_once                    ? absorbedAtOnce()
+                      : seen == LeafRays::kNothing ? absorbed()
+                                                   : seen;
   while (count > 0) {
     steps.push_back({by[--count], end});
     end = endCount() + static_cast<std::uint32_t>(steps.size() - 1);

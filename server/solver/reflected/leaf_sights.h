@@ -39,13 +39,24 @@ class LeafSights {
     step_bytes_ = step_bytes;
   }
 
-  /// Leaf values. What is seen is one of them, below this, or it isAbsorbed(), or the sky, above the horizon or below.
+  /// Leaf values. What is seen is one of them, below this, or it isAbsorbed(), or isSky().
   [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
   [[nodiscard]] bool isAbsorbed(std::uint32_t end) const { return end == absorbed() || end == absorbedAtOnce(); }
-  [[nodiscard]] std::uint32_t skyAbove() const { return leaf_count_ + 2; }
-  [[nodiscard]] std::uint32_t skyBelow() const { return leaf_count_ + 3; }
+  [[nodiscard]] bool isSky(std::uint32_t end) const { return end >= firstOfSky() && end < endCount(); }
+  [[nodiscard]] bool isSkyAbove(std::uint32_t end) const {
+    return end >= firstOfSky() && end < firstOfSky() + skyCount() / 2;
+  }
+  /// By number of end from the first of the sky on: its cells (SkyCells) where these are told apart, else its two
+  /// hemispheres, above the horizon and below.
+  [[nodiscard]] std::uint32_t firstOfSky() const { return leaf_count_ + 2; }
+  [[nodiscard]] std::uint32_t skyCount() const { return tells_cells_ ? SkyCells::kCount : 2; }
   /// All of these are below this. What is not is a step: of number end - endCount().
-  [[nodiscard]] std::uint32_t endCount() const { return leaf_count_ + 4; }
+  [[nodiscard]] std::uint32_t endCount() const { return firstOfSky() + skyCount(); }
+  /// From now on rays that leave the scene know by which cell of the sky, those that are traced, too: of rays that went
+  /// on before they left, of which only the scene tells that, it is asked again by the next trace(). O(rays). Throws
+  /// std::bad_alloc, and nothing is changed then.
+  void tellCells();
+  [[nodiscard]] bool tellsCells() const { return tells_cells_; }
   /// Rays that end on this leaf go on.
   [[nodiscard]] bool isParted(std::uint32_t value) const {
     return rays_->isCut(value) || (!partly_inside_.empty() && partly_inside_[value]);
@@ -149,6 +160,10 @@ class LeafSights {
   /// On an unlit side; within the width of the leaf that the ray comes from.
   [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
   [[nodiscard]] std::uint32_t absorbedAtOnce() const { return leaf_count_ + 1; }
+  [[nodiscard]] std::uint32_t skyEnd(std::uint32_t cell) const {
+    return firstOfSky() + (tells_cells_ ? cell : SkyCells::isAbove(cell) ? 0 : 1);
+  }
+  [[nodiscard]] PackedNumbers withCells(std::size_t half, std::uint32_t more) const;
   /// Steps, numbered from 0, and the rays that have them.
   struct NewSteps {
     struct Ray {
@@ -228,6 +243,7 @@ class LeafSights {
   std::vector<bool> partly_inside_;  ///< by leaf value; empty: none is
   std::size_t most_bytes_ = SIZE_MAX, step_bytes_ = 0;
   bool goes_on_ = true, is_short_ = false;  ///< rays of this slice; some did not
+  bool tells_cells_ = false;                ///< of the sky
   std::uint64_t traced_ = 0, kept_ = 0;
 };
 

@@ -105,7 +105,7 @@ std::uint64_t LeafSights::inheritLeaf(const LeafRun& leaf, const PackedNumbers::
     const auto first = met.end[k];
     if (first == kUntraced) continue;  // it saw what is gone, or moved
     // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
-    const bool is_known = first < leaf_count_ || first >= skyAbove();
+    const bool is_known = first < leaf_count_ || isSky(first);
     const bool may_pass =
         first >= leaf_count_ || from.stands_in[first] || (met.may_hide[k] != 0 && look.mayHideScreened(first));
     if (may_pass && !draw) draw.emplace(draws(value, rays_->sideOf(value), half));
@@ -120,6 +120,7 @@ std::uint64_t LeafSights::inheritLeaf(const LeafRun& leaf, const PackedNumbers::
 
 void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change,
                          std::uint16_t most) {
+  tells_cells_ = former.tells_cells_;
   // New leaves get as many rays as most have: in the middle of all.
   auto sorted = former.count_;
   std::erase(sorted, 0);
@@ -134,8 +135,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   std::vector<std::uint32_t> value_after(former.endCount(), kUntraced);
   value_after[former.absorbed()] = absorbed();
   value_after[former.absorbedAtOnce()] = absorbedAtOnce();
-  value_after[former.skyAbove()] = skyAbove();
-  value_after[former.skyBelow()] = skyBelow();
+  for (std::uint32_t i = 0; i < skyCount(); ++i) value_after[former.firstOfSky() + i] = firstOfSky() + i;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     if (value_before[value] == scene::kNone) continue;
     value_after[value_before[value]] = value;

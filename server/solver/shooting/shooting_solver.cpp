@@ -19,6 +19,7 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
+  punctual.rays_see_sky = false;
   return punctual;
 }
 

@@ -51,7 +51,7 @@ PlaceLight::PlaceLight(const SolvedScene& solved)
   }
   const PunctualLights punctual(patches_, solved.sources, {});
   sources_ = punctual.makeSources(patches_, solved.sources);
-  sky_ = {glm::dvec3(skyRadiosity(true, sources_)), glm::dvec3(skyRadiosity(false, sources_))};
+  sky_.emplace(sources_);
   std::erase_if(sources_, [](const auto& source) { return source.kind == PunctualLights::Source::Kind::kSky; });
   for (const auto& side : *sides_) {
     const auto emission = solved.materials.emission.side(side.number);
@@ -123,7 +123,7 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
 /// Towards whoever sees it there: of a leaf that something cuts the light of that very place.
 glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                std::size_t steps) const {
-  if (value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow) return sky_[value == LeafRays::kSkyAbove ? 0 : 1];
+  if (LeafRays::isSky(value)) return sky_->at(value - LeafRays::kSky);
   if (value == LeafRays::kNothing) return glm::dvec3(0.0);
   if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
@@ -266,7 +266,7 @@ bool PlaceLight::isOpen(const LeafRays::Place& from, const glm::dvec3& to, const
   if (!(length > kNearEnd)) return false;
   LeafRays::Place end;
   const auto value = rays_->see(from, way / length, key, end);
-  if (value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow) return true;
+  if (LeafRays::isSky(value)) return true;
   return glm::distance(end.position, from.position) >= length - kNearEnd;
 }
 

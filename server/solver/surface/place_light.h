@@ -16,6 +16,7 @@
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/lamps/light_tree.h"
 #include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/lamps/sky_sources.h"
 #include "server/solver/patches/lights.h"
 #include "server/solver/rays/leaf_rays.h"
 
@@ -79,7 +80,7 @@ class PlaceLight {
   std::vector<LightPolygon> lamps_;  ///< each by itself; empty: there are too many, or none
   std::optional<LightTree> many_;
   std::vector<PunctualLights::Source> sources_;
-  std::array<glm::dvec3, 2> sky_{};  ///< above the horizon, below
+  std::optional<SkyLight> sky_;
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
 };

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "server/scene/values/light_web.h"
+#include "server/scene/values/sky_table.h"
 #include "server/solver/math/lamp_form_factor.h"
 #include "server/solver/math/polygon_form_factor.h"
 
@@ -21,6 +22,8 @@ constexpr double kInPlane = 1e-6;
 /// A flat lamp whose half diagonal is less than this part of its distance is a point: to a millionth, where the sums of
 /// the closed forms would cancel.
 constexpr double kSmall = 1e-3;
+/// Points of what is far lie so far from a place: twice as far as the unit box is wide.
+constexpr double kFar = 4.0;
 
 glm::dvec3 perpendicularTo(const glm::dvec3& axis) {
   const glm::dvec3 helper = std::abs(axis.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
@@ -69,6 +72,27 @@ LampPoint pointAt(const Lamp& lamp, const glm::dvec3& place, const glm::dvec3& n
   return {point, strength * arrives / (distance * square) * lamp.fade(distance)};
 }
 
+/// Directions are spread evenly over the solid angle in which a sun is seen.
+LampPoint sunPoint(const LampShape& shape, const glm::dvec3& place, const glm::dvec3& normal, const glm::dvec2& at) {
+  const auto sine = static_cast<double>(shape.half.x);
+  const double part = sine * sine / (1.0 + std::sqrt(1.0 - sine * sine));  // 1 - cosine of its radius
+  const auto direction = around(glm::dvec3(shape.axis), 1.0 - at.x * part, at.y);
+  const double brings = 2.0 * part / (sine * sine);
+  return {place + kFar * direction, std::max(0.0, glm::dot(normal, direction)) * brings};
+}
+
+/// From the directions of a sky's table to those of the scene.
+glm::dvec3 turned(const LampShape& shape, const glm::dvec3& direction) {
+  const auto cosine = static_cast<double>(shape.across.x), sine = static_cast<double>(shape.across.z);
+  return {cosine * direction.x - sine * direction.z, direction.y, sine * direction.x + cosine * direction.z};
+}
+
+/// Directions are drawn in proportion to the light that comes from there.
+LampPoint skyPoint(const Lamp& lamp, const glm::dvec3& place, const glm::dvec3& normal, const glm::dvec2& at) {
+  const auto direction = turned(lamp.shape, scene::skyDirection(lamp.web, at));
+  return {place + kFar * direction, std::max(0.0, glm::dot(normal, direction))};
+}
+
 LampPoint flatPoint(const Lamp& lamp, const glm::dvec3& place, const glm::dvec3& normal, const glm::dvec2& at) {
   const auto& shape = lamp.shape;
   return pointAt(lamp, place, normal, shape.kind == Kind::kWeb ? glm::dvec3(shape.centre) : shape.pointOn(at));
@@ -107,6 +131,14 @@ double Lamp::fade(double distance) const {
 
 double wholeIrradiance(const Lamp& lamp, const glm::dvec3& place, const glm::dvec3& normal) {
   const auto& shape = lamp.shape;
+  if (shape.kind == Kind::kSun) {
+    const auto sine = static_cast<double>(shape.half.x);
+    return ballFormFactor(glm::dvec3(0.0), normal, glm::dvec3(shape.axis), sine) / (sine * sine);
+  }
+  if (shape.kind == Kind::kSky) {
+    const auto mean = turned(shape, scene::meanSkyDirection(lamp.web));
+    return std::max(0.0, glm::dot(normal, mean)) + 0.25 * std::max(0.0, 1.0 - glm::length(mean));
+  }
   const glm::dvec3 centre(shape.centre), axis(shape.axis);
   if (shape.kind == Kind::kBall) {
     const auto radius = static_cast<double>(shape.half.x);
@@ -123,6 +155,8 @@ double wholeIrradiance(const Lamp& lamp, const glm::dvec3& place, const glm::dve
 }
 
 LampPoint lampPoint(const Lamp& lamp, const glm::dvec3& place, const glm::dvec3& normal, const glm::dvec2& at) {
+  if (lamp.shape.kind == Kind::kSun) return sunPoint(lamp.shape, place, normal, at);
+  if (lamp.shape.kind == Kind::kSky) return skyPoint(lamp, place, normal, at);
   return lamp.shape.kind == Kind::kBall ? ballPoint(lamp, place, normal, at) : flatPoint(lamp, place, normal, at);
 }
 
@@ -130,6 +164,10 @@ LampRay lampRay(const Lamp& lamp, const std::array<double, 4>& at) {
   const auto& shape = lamp.shape;
   const glm::dvec3 axis(shape.axis), up(0.0, 1.0, 0.0);
   LampRay ray;
+  if (shape.isFar()) {
+    const auto point = lampPoint(lamp, glm::dvec3(0.0), glm::dvec3(0.0), {at[0], at[1]}).position / kFar;
+    return {glm::vec3(point), glm::vec3(-point), 1.0};
+  }
   if (shape.kind == Kind::kBall) {
     const auto direction = around(up, 1.0 - 2.0 * at[0], at[1]);
     const auto from = around(direction, std::sqrt(1.0 - at[2]), at[3]);  // by the cosine with the ball's normal

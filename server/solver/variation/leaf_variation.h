@@ -20,6 +20,7 @@
 
 #include "server/solver/edits/shadows.h"
 #include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/lamps/sky_sources.h"
 #include "server/solver/patches/lights.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/reflected/leaf_sights.h"
@@ -35,6 +36,7 @@ struct LeafLight {
   std::span<const PunctualLights::Source> sources;
   /// Null: reflected light does not come by rays, which know what varies where a leaf is parted.
   const LeafSights* sights = nullptr;
+  const SkyLight* sky = nullptr;  ///< null: black
 };
 
 class LeafVariation {

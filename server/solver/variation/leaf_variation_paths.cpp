@@ -105,7 +105,7 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64
 double LeafVariation::nearest() const { return kNear * rays_->greatestWidth(); }
 
 bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
-  return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_->widthOf(sight.end.value);
+  return sight.end.value < LeafRays::kSky && sight.distance <= kNear * rays_->widthOf(sight.end.value);
 }
 
 LeafVariation::Way LeafVariation::firstWay(std::uint32_t receiver, std::uint64_t key) const {
@@ -242,7 +242,8 @@ bool LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light, C
 LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& light, std::size_t half) const {
   const auto radiosity = [&](std::uint32_t value) {
     if (value == LeafRays::kNothing) return glm::vec3(0.0F);
-    if (value >= LeafRays::kSkyBelow) return skyRadiosity(value == LeafRays::kSkyAbove, light.sources);
+    if (value >= LeafRays::kSky)
+      return light.sky != nullptr ? glm::vec3(light.sky->at(value - LeafRays::kSky)) : glm::vec3(0.0F);
     return light.reflectance[value] * light.irradiance[half][value] + light.emission[value];
   };
   glm::vec3 direct(0.0F);

@@ -10,6 +10,7 @@ import type { Connection, LinkState } from '../protocol/connection';
 import type { Bookmark, HelloReply, LightmapsNote, Notifications, Progress, ServerInfo } from '../protocol/messages';
 import { GeometryFetch } from '../scenes/geometry_fetch';
 import { SceneSession } from '../scenes/scene_session';
+import { SkyFetch } from '../scenes/sky_fetch';
 import { Share } from '../scenes/share';
 import { Bookmarks } from '../session/bookmarks';
 import { LinkNotice } from '../session/link_notice';
@@ -39,6 +40,7 @@ export class App {
   readonly solve: SolveSession;
   readonly view: ViewSession;
   readonly meter: LightMeter;
+  private readonly sky: SkyFetch;
   readonly edit: EditSession;
   readonly people: PeopleSession;
   readonly scene: SceneSession<Placed>;
@@ -62,6 +64,7 @@ export class App {
     this.geometry = new GeometryFetch(access.fetch, this.viewer, toasts);
     this.solve = this.makeSolve();
     this.view = this.makeView();
+    this.sky = new SkyFetch({ fetch: access.fetch, show: (bytes) => this.viewer.setSkyPicture(bytes) });
     this.edit = this.makeEdit();
     this.history = this.makeHistory();
     this.meter = this.makeMeter();
@@ -170,6 +173,8 @@ export class App {
       },
       frameSelection: () => this.view.frameNode(this.edit.selection?.node),
       loadFile: (file) => void this.scene.loadFile(file),
+      upload: (file) => this.scene.send(file),
+      documentChanged: (gltf) => this.sky.onDocument(gltf),
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
   }

@@ -4,9 +4,11 @@ import type { Object3D } from 'three';
 import * as edits from '../document/edits';
 import { type Gltf, hangingNodes, isSameScene, nodeName } from '../document/gltf';
 import { handlesOf, lightOf } from '../document/lights';
+import { setSkyPicture, setSkyTurn } from '../document/skies';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
 import type { Patch, ScenePatchedNote } from '../protocol/messages';
 import { type PageName, shownName } from '../protocol/page_name';
+import { RpcError } from '../protocol/rpc';
 import type { Frame } from '../ui/frame';
 import { ScenePanel, type Selection } from '../ui/scene_panel';
 import type { GizmoMode } from '../view/controls/gizmo';
@@ -25,6 +27,10 @@ export interface EditHost {
   historyChanged(): void;
   frameSelection(): void;
   loadFile(file: File): void;
+  /** Keeps a file on the server and returns its URL there; rejects with the reason that the server gives. */
+  upload(file: File): Promise<string>;
+  /** The document has come, or changed. */
+  documentChanged(gltf: Gltf): void;
   notAccepted(text: string, wanted: string): void;
 }
 
@@ -65,6 +71,8 @@ export class EditSession {
       frameSelection: () => host.frameSelection(),
       endGesture: () => this.document.endGesture(),
       loadFile: (file) => host.loadFile(file),
+      setSky: (member, value) => this.make('Sky', setSkyTurn(member, value), `sky ${member}`),
+      openSky: (file) => void this.openSky(file),
       notAccepted: (text, wanted) => host.notAccepted(text, wanted),
     });
   }
@@ -195,6 +203,17 @@ export class EditSession {
     }
   }
 
+  /** Gives the scene another picture as its sky. */
+  async openSky(file: File): Promise<void> {
+    try {
+      const uri = await this.host.upload(file);
+      await this.document.edit('Sky', setSkyPicture(this.document.gltf, uri, file.size));
+    } catch (error) {
+      // A refusal of the edit was shown.
+      if (!(error instanceof RpcError)) this.host.frame.toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+    }
+  }
+
   removeSelected(): void {
     if (this.selection) this.remove(this.selection.node);
   }
@@ -209,6 +228,7 @@ export class EditSession {
   private onChanged(pointers: string[]): void {
     const { gltf } = this.document;
     this.host.picture.applyDocument(gltf, pointers);
+    this.host.documentChanged(gltf);
     if (pointers.length === 0) {
       // The document may come after the picture: an object that was clicked meanwhile stays selected, unless the server
       // has come back with another scene, in which its number means another object.

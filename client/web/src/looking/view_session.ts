@@ -9,6 +9,7 @@ import { fromLink, MOST_STOPS, toLink, type ShownAs } from '../view/looks/link';
 import { TONE_CURVES, viewMode, type ViewMode } from '../view/looks/view_modes';
 import { insideView } from '../view/rays/first_view';
 import type { LitScene } from '../view/scene/lit_scene';
+import { pictureKey } from '../document/skies';
 import { shining, skyOf } from '../view/scene/sky';
 import type { Viewer } from '../view/viewer';
 
@@ -147,7 +148,8 @@ export class ViewSession {
     const { background, rig } = this.host.picture;
     rig.overview(scene.bounds);
     const sky = shining(skyOf(scene.source) ?? background.ofSettings); // the document may still be on its way
-    const inside = insideView(scene, rig.camera, sky !== undefined);
+    const hasSky = sky !== undefined || pictureKey(scene.source) !== undefined;
+    const inside = insideView(scene, rig.camera, hasSky);
     if (inside) rig.stand(inside.eye, inside.target);
   }
 

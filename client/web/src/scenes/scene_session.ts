@@ -122,7 +122,7 @@ export class SceneSession<Placed> {
   }
 
   /** Keeps the file on the server and returns its URL there. Rejects with the reason that the server gives. */
-  private async send(file: File, signal: AbortSignal): Promise<string> {
+  async send(file: File, signal?: AbortSignal): Promise<string> {
     const response = await this.host.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
       method: 'PUT',
       body: file,

@@ -8,7 +8,9 @@ import type { Placement } from '../document/edits';
 import { fromHex, toHex } from '../page/colours';
 import { button, buttons, panel, checkbox, field, h, row, section } from '../page/dom';
 import { parseNumber } from '../page/numbers';
+import type { SkyTurn } from '../document/skies';
 import { emissionFields, emissionWritten } from './emission_fields';
+import { SkyFields } from './sky_fields';
 
 export interface Selection {
   node: number;
@@ -27,6 +29,8 @@ export interface ScenePanelActions {
   frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
+  setSky(member: keyof SkyTurn, value: number): void;
+  openSky(file: File): void;
   /** `wanted`: the values that the field accepts. */
   notAccepted(text: string, wanted: string): void;
 }
@@ -73,8 +77,10 @@ export class ScenePanel {
   /** The user is writing a value that was not sent yet. */
   private typing = false;
   private materialsOf: (node: number) => number[] = () => [];
+  private readonly sky: SkyFields;
 
   constructor(private readonly actions: ScenePanelActions) {
+    this.sky = new SkyFields(actions);
     const file = h('input', { type: 'file', accept: '.glb,.gltf', class: 'offscreen', tabIndex: -1 });
     file.onchange = () => {
       const chosen = file.files?.[0];
@@ -92,6 +98,7 @@ export class ScenePanel {
           file,
         ),
       ),
+      this.sky.element,
       this.editor,
     );
     this.find.addEventListener('input', () => this.showList());
@@ -123,6 +130,7 @@ export class ScenePanel {
    */
   refresh(): void {
     this.showList();
+    this.sky.show(this.gltf);
     if (!this.typing || !this.editor.contains(document.activeElement)) this.showEditor();
   }
 

@@ -32,6 +32,7 @@ import { Programs } from './scene/programs';
 import { release } from './scene/release';
 import { Screen } from './frames/screen';
 import { SkyBackground, skyOf } from './scene/sky';
+import { SkyPicture } from './scene/sky_picture';
 import type { ViewMode } from './looks/view_modes';
 
 /**
@@ -191,6 +192,12 @@ export class Viewer {
   /** The sky of the solve's settings. */
   setSky(sky: Sky | undefined): void {
     this.background.ofSettings = sky;
+    this.invalidate();
+  }
+
+  /** All of the sky, where it is more than colours: Radiance HDR. */
+  setSkyPicture(bytes: Uint8Array | undefined): void {
+    this.background.setPicture(bytes && SkyPicture.from(bytes));
     this.invalidate();
   }
 

@@ -18,7 +18,7 @@ TEST(LostLight, TheFluxOfEachLightIsWhatAllHaveTogether) {
       {.kind = scene::LightKind::kDirectional, .direction = {0.0, -1.0, 0.0}, .intensity = glm::vec3(3.0F)});
   sources.sky = {glm::vec3(1.0F), glm::vec3(0.0F, 2.0F, 0.0F)};
   const auto each = fluxes(*made.patches, sources);
-  ASSERT_EQ(each.size(), 6U);
+  ASSERT_EQ(each.size(), 7U);
   EXPECT_NEAR(each[0] / each[2], 2.5, 1e-6);
   EXPECT_EQ(each[1], 0.0);
   EXPECT_NEAR(each[4] / each[5], 1.5, 1e-6);

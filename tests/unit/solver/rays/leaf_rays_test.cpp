@@ -46,8 +46,8 @@ struct TilesInFloor {
     place.position = (glm::dvec3(x, from, z) - patches.centre) / patches.scale;
     place.normal = glm::dvec3(0.0, from > 0.0 ? -1.0 : 1.0, 0.0);
     const auto value = rays.see(place, place.normal, 1, end);
-    EXPECT_LT(value, LeafRays::kSkyBelow);
-    if (value >= LeafRays::kSkyBelow) return false;
+    EXPECT_LT(value, LeafRays::kSky);
+    if (value >= LeafRays::kSky) return false;
     EXPECT_GT(rays.areaOf(value), 0.0);
     return rays.sideOf(value).width >= 4;
   }
@@ -87,7 +87,7 @@ TEST(LeafRays, LongThinTurnedStripsDoNotHideTheSkyFromThemselves) {
     const auto seesSky = [&](const LeafRays::Place& from, const glm::dvec3& way) {
       LeafRays::Place end;
       const auto seen = rays.see(from, way, 1, end);
-      return seen == LeafRays::kSkyAbove || seen == LeafRays::kSkyBelow;
+      return LeafRays::isSky(seen);
     };
     for (int i = 0; i < 2'000; ++i) {
       const auto place = rays.placeOn(static_cast<std::uint32_t>(i % 40), {unit(random), unit(random)});
@@ -95,7 +95,7 @@ TEST(LeafRays, LongThinTurnedStripsDoNotHideTheSkyFromThemselves) {
       const auto way = cosineDirection(place.normal, unit(random), unit(random));
       hidden += seesSky(place, way) ? 0 : 1;
       const LeafRays::Place before{place.position + 0.3 * way, -way};
-      if (rays.see(before, -way, 1, end) >= LeafRays::kSkyBelow) continue;
+      if (rays.see(before, -way, 1, end) >= LeafRays::kSky) continue;
       ++seen;
       const auto on = cosineDirection(end.normal, unit(random), unit(random));
       hidden_there += seesSky(end, on) ? 0 : 1;
@@ -123,7 +123,7 @@ TEST(LeafRays, EndWhereTheyAreSeenToEndWhereAllNormalsAreTheSame) {
       const auto place = rays.placeOn(value, {uniform(random), uniform(random)});
       const auto direction = cosineDirection(place.normal, uniform(random), uniform(random));
       const auto sight = rays.look(place, direction);
-      ASSERT_LT(sight.end.value, LeafRays::kSkyBelow);
+      ASSERT_LT(sight.end.value, LeafRays::kSky);
       const auto end = rays.endOn(sight.end.value, place, direction);
       flat += glm::dot(sight.end.normal, direction) > -0.05 ? 1 : 0;
       if (!end) continue;

@@ -198,23 +198,34 @@ void main() {
   gl_FragColor = vec4(resident > kNothing ? vec3(0.25) : shade, 1.0);
 }`;
 
-/** A triangle that covers the picture. `rise`: how steeply the view ray goes up or down. */
+/** A triangle that covers the picture. `rise`: how steeply the view ray goes up or down; `ray`: all of it. */
 export const SKY_VERTEX = `
 varying float rise;
+varying vec3 ray;
 void main() {
-  vec3 ray = vec3(position.x / projectionMatrix[0][0], position.y / projectionMatrix[1][1], -1.0);
-  rise = (transpose(mat3(viewMatrix)) * ray).y;
+  vec3 seen = vec3(position.x / projectionMatrix[0][0], position.y / projectionMatrix[1][1], -1.0);
+  ray = transpose(mat3(viewMatrix)) * seen;
+  rise = ray.y;
   gl_Position = vec4(position.xy, 0.0, 1.0);
 }`;
 
-/** Pixels on the horizon mix both parts of the sky, as in the server's pictures. */
+/** Pixels on the horizon mix both parts of the sky, as in the server's pictures. A picture is all of it. */
 export const SKY_FRAGMENT = `
 #include <common>
 varying float rise;
+varying vec3 ray;
 uniform vec3 skyUpper, skyLower;  // nits
+uniform bool skyIsPicture;
+uniform sampler2D skyPicture;     // equirectangular, row 0 at the zenith
 uniform bool measuring;           // the exposure does not depend on the sky
 ${DISPLAY_PARS}
 void main() {
   float above = clamp(0.5 + rise / max(length(vec2(dFdx(rise), dFdy(rise))), 1e-9), 0.0, 1.0);
-  gl_FragColor = measuring ? vec4(0.0) : vec4(displayed(mix(skyLower, skyUpper, above)), 1.0);
+  vec3 nits = mix(skyLower, skyUpper, above);
+  if (skyIsPicture) {
+    vec3 d = normalize(ray);
+    // Across the seam the coordinate jumps: the largest level of the texture is its only one.
+    nits = textureLod(skyPicture, vec2(atan(d.z, d.x) * 0.5 * RECIPROCAL_PI + 0.5, acos(clamp(d.y, -1.0, 1.0)) * RECIPROCAL_PI), 0.0).rgb;
+  }
+  gl_FragColor = measuring ? vec4(0.0) : vec4(displayed(nits), 1.0);
 }`;

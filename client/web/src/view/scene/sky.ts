@@ -1,11 +1,20 @@
 // The sky behind the scene: a triangle that covers the picture and is drawn before everything else.
 
-import { BufferGeometry, Float32BufferAttribute, Mesh, type PerspectiveCamera, ShaderMaterial, Vector3 } from 'three';
+import {
+  BufferGeometry,
+  Float32BufferAttribute,
+  Mesh,
+  type PerspectiveCamera,
+  ShaderMaterial,
+  type Texture,
+  Vector3,
+} from 'three';
 import type { Gltf, Vec3 } from '../../document/gltf';
 import { isObject } from '../../document/json_patch';
 import type { Sky } from '../../protocol/messages';
 import { specialise, type ViewUniforms } from './lit_material';
 import { SKY_FRAGMENT, SKY_VERTEX } from './lit_shader';
+import type { SkyPicture } from './sky_picture';
 import { luminance } from '../../page/colours';
 
 /** The sky of a document; undefined: it has none, or none that the server would accept. */
@@ -31,7 +40,14 @@ export class SkyBackground {
   ofScene: Sky | undefined;
   /** The sky of the solve's settings, for scenes without a sky of their own. */
   ofSettings: Sky | undefined;
-  private readonly colours = { skyUpper: { value: new Vector3() }, skyLower: { value: new Vector3() } };
+  /** All of the sky, where it is more than colours. */
+  private picture: SkyPicture | undefined;
+  private readonly colours = {
+    skyUpper: { value: new Vector3() },
+    skyLower: { value: new Vector3() },
+    skyIsPicture: { value: false },
+    skyPicture: { value: null as Texture | null },
+  };
 
   constructor(private readonly view: ViewUniforms) {
     const geometry = new BufferGeometry();
@@ -54,21 +70,36 @@ export class SkyBackground {
     return shining(this.ofScene ?? this.ofSettings);
   }
 
+  /** There is something to draw. */
+  get shines(): boolean {
+    return this.picture !== undefined || this.sky !== undefined;
+  }
+
+  setPicture(picture: SkyPicture | undefined): void {
+    this.picture?.dispose();
+    this.picture = picture;
+    this.colours.skyIsPicture.value = picture !== undefined;
+    this.colours.skyPicture.value = picture?.texture ?? null;
+  }
+
   /** Before each frame. `isShown`: the view shows the colours of light that leaves surfaces, and there is some. */
   refresh(isShown: boolean): void {
     const { sky } = this;
-    this.mesh.visible = isShown && sky !== undefined;
-    if (!this.mesh.visible || !sky) return;
-    this.colours.skyUpper.value.set(...sky.upper);
-    this.colours.skyLower.value.set(...sky.lower);
+    this.mesh.visible = isShown && this.shines;
+    if (!this.mesh.visible) return;
+    if (sky) {
+      this.colours.skyUpper.value.set(...sky.upper);
+      this.colours.skyLower.value.set(...sky.lower);
+    }
     specialise(this.mesh.material, this.view.defines);
   }
 
   /** Luminance (nits) where a camera sees only the sky. `x`, `y`: normalised device coordinates. */
   luminanceAt(camera: PerspectiveCamera, x: number, y: number): number {
-    const { sky } = this;
-    if (!sky) return 0;
+    const { sky, picture } = this;
     const ahead = new Vector3(x, y, 0.5).unproject(camera).sub(camera.position);
+    if (picture) return luminance(picture.at(ahead));
+    if (!sky) return 0;
     return luminance(ahead.y >= 0 ? sky.upper : sky.lower);
   }
 }
