@@ -228,9 +228,19 @@ void addAdd(CLI::App& app, Run& run) {
 
 // ---- sky ----
 
+/// The sky that is there.
+ExitCode turnSky(const Remote& remote, const SkyOptions& options) {
+  const auto reply = editScene(remote, [&](const Json& gltf) { return skyTurnPatch(gltf, options); });
+  if (!reply) return complain(reply.error());
+  printEdit(reply->revision, reply->affected_surfaces, reply->affected_shots);
+  return ExitCode::kOk;
+}
+
 ExitCode changeSky(const RemoteOptions& server, const SkyOptions& options) {
   const auto remote = remoteFrom(server);
   if (!remote) return complain(remote.error());
+  const bool is_turn = options.sky.empty() && options.sun.empty() && !options.sun_angle && !options.turbidity;
+  if (is_turn && (options.rotation || options.strength)) return turnSky(*remote, options);
   const auto choice = skyChoice(options);
   if (!choice) return complain(choice.error());
   if (choice->colours)
@@ -255,7 +265,9 @@ void addSky(CLI::App& app, Run& run) {
     SkyOptions sky;
   };
   auto options = std::make_shared<Options>();
-  auto& command = *app.add_subcommand("sky", "give the scene another sky: a picture, or daylight");
+  auto& command = *app.add_subcommand("sky",
+                                      "give the scene another sky, a picture or daylight; or turn the one it has, by "
+                                      "--sky-rotation and --sky-strength alone");
   addRemoteOptions(command, options->server);
   addSkyOptions(command, options->sky);
   command.callback([options, &run] { run = [options] { return changeSky(options->server, options->sky); }; });

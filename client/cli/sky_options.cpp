@@ -26,7 +26,12 @@ tl::unexpected<Error> bad(std::string what, std::string where) {
   return fail(ErrorCode::kBadUsage, std::move(what), std::move(where));
 }
 
+/// A plus may stand before it, and spaces around it.
 bool number(std::string_view text, double& into) {
+  const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
+  if (first == std::string_view::npos) return false;
+  text = text.substr(first, last + 1 - first);
+  if (text.front() == '+') text.remove_prefix(1);
   const auto* end = text.data() + text.size();
   const auto [read, error] = std::from_chars(text.data(), end, into);
   return error == std::errc() && read == end;
@@ -84,10 +89,10 @@ std::string dataUri(const std::string& bytes) {
          base64({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
-/// Where the GLB has bytes the picture follows them; else it is in the JSON.
+/// Where the first buffer is the bytes of the GLB the picture follows them; else it is in the JSON.
 void embed(const std::string& picture, Json& sky, Model& model) {
   if (picture.empty()) return;
-  if (model.bin.empty()) {
+  if (model.bin.empty() || model.gltf.at("buffers").at(0).contains("uri")) {
     sky["uri"] = dataUri(picture);
     return;
   }
@@ -224,6 +229,18 @@ Json skyPatch(const Json& gltf, const SkyChoice& choice, const std::string& uri,
   }
   if (!gltf.contains("extras") || !gltf["extras"].is_object()) add("/extras", Json::object());
   add("/extras/radiositySky", std::move(sky));
+  return patch;
+}
+
+Result<Json> skyTurnPatch(const Json& gltf, const SkyOptions& options) {
+  const auto sky = gltf.value(Json::json_pointer("/extras/radiositySky"), Json());
+  if (!sky.is_object() || !(sky.contains("bufferView") || sky.contains("uri") || sky.contains("daylight")))
+    return fail(ErrorCode::kBadUsage, "the scene has no picture or daylight of its own that could be changed",
+                options.rotation ? "--sky-rotation" : "--sky-strength");
+  Json patch = Json::array();
+  for (const auto& [value, name] : {std::pair(options.rotation, "rotation"), std::pair(options.strength, "strength")})
+    if (value)
+      patch.push_back({{"op", "add"}, {"path", std::string("/extras/radiositySky/") + name}, {"value", *value}});
   return patch;
 }
 

@@ -43,6 +43,8 @@ struct SceneBytes {
 
 /// Bytes of the picture; empty where there is none.
 [[nodiscard]] Result<std::string> readPicture(const SkyChoice& choice);
+/// Turns the scene's own picture or daylight, or makes it as strong, by those options alone. kBadUsage: it has none.
+[[nodiscard]] Result<Json> skyTurnPatch(const Json& gltf, const SkyOptions& options);
 /// An edit of a scene; `uri`: of the uploaded picture, which has so many bytes.
 [[nodiscard]] Json skyPatch(const Json& gltf, const SkyChoice& choice, const std::string& uri, std::size_t bytes);
 

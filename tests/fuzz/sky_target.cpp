@@ -27,14 +27,14 @@ std::string word(std::uint32_t value) {
   return text;
 }
 
-/// Two pixels of half floats, not compressed.
-std::string exr() {
+/// Two pixels of half floats, not compressed; `more`: attributes.
+std::string exr(const std::string& more = "") {
   std::string channels;
   for (const char* name : {"B", "G", "R"})
     channels += std::string(name) + '\0' + word(1) + std::string(4, '\0') + word(1) + word(1);
   const auto window = word(0) + word(0) + word(1) + word(0);
   std::string file = "\x76\x2F\x31\x01" + word(2) + attribute("channels", "chlist", channels + '\0') +
-                     attribute("compression", "compression", std::string(1, '\0')) +
+                     attribute("compression", "compression", std::string(1, '\0')) + more +
                      attribute("dataWindow", "box2i", window) + attribute("displayWindow", "box2i", window) +
                      attribute("lineOrder", "lineOrder", std::string(1, '\0')) +
                      attribute("pixelAspectRatio", "float", std::string("\0\0\x80\x3F", 4)) +
@@ -51,8 +51,14 @@ std::vector<Seed> seeds() {
   std::string row("\x02\x02\x00\x08", 4);
   for (int channel = 0; channel < 3; ++channel) row += std::string("\x88\x50", 2);
   row += std::string("\x04\x80\x81\x82\x83\x84\x80", 7);
-  return {seedOf(hdr("-Y 1 +X 2", pixel + pixel)), seedOf(hdr("-Y 1 +X 3", pixel + std::string("\x01\x01\x01\x02", 4))),
-          seedOf(hdr("-Y 2 +X 8", row + row)), seedOf(hdr("-Y 8192 +X 16384", row)), seedOf(exr())};
+  return {seedOf(hdr("-Y 1 +X 2", pixel + pixel)),
+          seedOf(hdr("-Y 1 +X 3", pixel + std::string("\x01\x01\x01\x02", 4))),
+          seedOf(hdr("-Y 2 +X 8", row + row)),
+          seedOf(hdr("-Y 8192 +X 16384", row)),
+          seedOf(exr()),
+          seedOf(exr(attribute("tiles", "tiledesc", word(64) + word(64) + '\0') +
+                     attribute("preview", "preview", word(2) + word(1) + std::string(8, '\0')) +
+                     attribute("whiteLuminance", "float", std::string("\0\0\x80\x40", 4))))};
 }
 
 }  // namespace radiosity::fuzz

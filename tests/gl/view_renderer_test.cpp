@@ -70,7 +70,7 @@ class View : public ::testing::Test {
   static void expectNear(glm::vec3 actual, glm::vec3 expected, float tolerance = 1e-4F) {
     for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(actual[channel], expected[channel], tolerance);
   }
-  static constexpr scene::Sky kSky{{3.0F, 4.0F, 6.0F}, {0.5F, 0.25F, 0.125F}};
+  inline static const scene::Sky kSky{{3.0F, 4.0F, 6.0F}, {0.5F, 0.25F, 0.125F}};
   std::unique_ptr<ViewRenderer> renderer_;
 };
 

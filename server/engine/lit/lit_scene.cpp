@@ -436,7 +436,8 @@ std::vector<std::string> LitScene::warnings(std::size_t most) const {
     first.insert(first.end(), some->begin(), some->begin() + count);
   }
   if (hasNoLamp() && first.size() < most) {
-    first.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
+    const char* of_sky = scene_->sky ? "its sky is dark" : "no sky; --sky 1000 adds one";
+    first.emplace_back(std::string("nothing shines: the scene has no emissive surface, no light, and ") + of_sky);
   }
   if (settings_.method == Method::kPaper && first.size() < most) {
     first.emplace_back(

@@ -63,18 +63,33 @@ class HdrFile {
       if (text->empty()) return readSize();
       if (text->starts_with("FORMAT=") && *text != "FORMAT=32-bit_rle_rgbe")
         return fail(ErrorCode::kUnsupported, std::string(*text) + "; only 32-bit_rle_rgbe is read", where_);
-      if (text->starts_with("EXPOSURE=")) {
-        const auto number = text->substr(
-            text->find_first_not_of(" ", 9) == std::string_view::npos ? 9 : text->find_first_not_of(" ", 9));
-        double exposure = 0.0;
-        const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), exposure);
-        if (error != std::errc() || !(exposure > 1e-12 && exposure < 1e12))
-          return bad("EXPOSURE must be a number above 0");
-        exposure_ *= exposure;
-        if (!(exposure_ > 1e-12 && exposure_ < 1e12)) return bad("EXPOSURE must be a number above 0");
-      }
+      if (text->starts_with("EXPOSURE="))
+        if (auto ok = divide(*text, 9, 1); !ok) return ok;
+      if (text->starts_with("COLORCORR="))
+        if (auto ok = divide(*text, 10, 3); !ok) return ok;
     }
     return bad("its header has more than " + std::to_string(kMostLines) + " lines");
+  }
+
+  /// By what pixels were multiplied with: one number for all channels, or one for each.
+  Result<void> divide(std::string_view line, std::size_t from, int count) {
+    const std::string name(line.substr(0, from - 1));
+    const auto wrong = [&] {
+      return bad(name + " must be " + (count == 1 ? "a number above 0" : "three numbers above 0"));
+    };
+    line.remove_prefix(from);
+    double number = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      if (c < count) {
+        line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+        const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), number);
+        if (error != std::errc()) return wrong();
+        line.remove_prefix(static_cast<std::size_t>(end - line.data()));
+      }
+      exposure_[c] *= number;
+      if (!(exposure_[c] > 1e-12 && exposure_[c] < 1e12)) return wrong();
+    }
+    return {};
   }
 
   /// "-Y 1024 +X 2048": rows from the top, columns from the left.
@@ -139,17 +154,22 @@ class HdrFile {
     return true;
   }
 
+  /// Writers cut what is below a mantissa's last digit off: half of it is what is lost in the mean.
   [[nodiscard]] glm::vec3 colourOf(const Rgbe& pixel) const {
-    if (pixel[3] == 0) return glm::vec3(0.0F);
-    const double scale = std::ldexp(1.0, int{pixel[3]} - 136) / exposure_;
-    return {static_cast<float>(scale * pixel[0]), static_cast<float>(scale * pixel[1]),
-            static_cast<float>(scale * pixel[2])};
+    glm::vec3 colour(0.0F);
+    if (pixel[3] == 0) return colour;
+    const double scale = std::ldexp(1.0, int{pixel[3]} - 136);
+    for (int c = 0; c < 3; ++c) {
+      const auto mantissa = pixel[static_cast<std::size_t>(c)];
+      if (mantissa > 0) colour[c] = static_cast<float>(scale * (mantissa + 0.5) / exposure_[c]);
+    }
+    return colour;
   }
 
   std::span<const std::uint8_t> rest_;
   const std::string& where_;
   std::size_t columns_ = 0, rows_ = 0;
-  double exposure_ = 1.0;
+  glm::dvec3 exposure_{1.0};
 };
 
 }  // namespace

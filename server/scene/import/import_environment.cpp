@@ -20,8 +20,8 @@ constexpr double kPi = std::numbers::pi, kMostStrength = 1e9;
 constexpr std::size_t kCoefficients = 9;
 /// Pixels of a face's picture at most.
 constexpr std::size_t kMostFacePixels = kMostCubeEdge * kMostCubeEdge;
-/// What irradiance has of radiance, by coefficient (Ramamoorthi and Hanrahan 2001). Those of EXT_lights_image_based are
-/// of irradiance; tools write those of KHR_environment_map of radiance.
+/// What irradiance has of radiance, by coefficient (Ramamoorthi and Hanrahan 2001). Both extensions say that theirs are
+/// of irradiance.
 constexpr std::array<double, kCoefficients> kSpread{kPi,     2.0 * kPi / 3, 2.0 * kPi / 3, 2.0 * kPi / 3, kPi / 4,
                                                     kPi / 4, kPi / 4,       kPi / 4,       kPi / 4};
 /// Of what is made of irradiance, which has no details.
@@ -109,6 +109,7 @@ class EnvironmentReader {
         (*levels)[0].size() != 6)
       return context_.bad(pointer, "must be six images");
     CubeMap cube;
+    std::size_t edge_of_all = 0;
     for (std::size_t f = 0; f < 6; ++f) {
       interruptionPoint();
       const auto at = pointer + "/" + std::to_string(f);
@@ -116,25 +117,39 @@ class EnvironmentReader {
       if (!bytes) return tl::unexpected(bytes.error());
       const auto texture = decodeImage(**bytes, kMostFacePixels, place(context_.document.name, at));
       if (!texture) return tl::unexpected(texture.error());
-      const auto size = static_cast<std::size_t>(texture->width);
-      if (texture->width != texture->height || (f > 0 && size != cube.size))
+      const auto edge = static_cast<std::size_t>(texture->width);
+      if (texture->width != texture->height || (f > 0 && edge != edge_of_all))
         return context_.bad(at, "must be square, and as large as the other faces");
-      cube.size = size;
-      cube.faces[f] = faceOf(*texture, sniffImageType(**bytes) == "image/png");
+      edge_of_all = edge;
+      cube.faces[f] = faceOf(*texture, cube.size);
     }
     return cube;
   }
 
-  /// Faces are saved mirrored from left to right; a PNG is divided by its alpha.
-  static std::vector<glm::vec3> faceOf(const Texture& texture, bool may_divide) {
-    const auto size = static_cast<std::size_t>(texture.width);
-    std::vector<glm::vec3> face(size * size);
-    for (std::size_t i = 0; i < face.size(); ++i) {
-      const auto* rgba = &texture.rgba[4 * i];
-      const float alpha = may_divide ? std::max<float>(rgba[3], 1.0F) : 255.0F;
-      face[i / size * size + (size - 1 - i % size)] = glm::vec3(rgba[0], rgba[1], rgba[2]) / alpha;
+  /// Faces are saved mirrored from left to right, and encoded for screens: as sRGB, or, where they have an alpha, with
+  /// an exponent of 2.2, and multiplied by it (RGBD, as Babylon.js writes and reads it).
+  static std::vector<glm::vec3> faceOf(const Texture& texture, std::size_t& size) {
+    const auto edge = static_cast<std::size_t>(texture.width);
+    bool is_divided = false;
+    for (std::size_t i = 3; i < texture.rgba.size(); i += 4) is_divided = is_divided || texture.rgba[i] < 255;
+    std::array<float, 256> linear{};
+    for (std::size_t i = 0; i < linear.size(); ++i) {
+      const float encoded = static_cast<float>(i) / 255.0F;
+      linear[i] = is_divided ? std::pow(encoded, 2.2F) : linearOf(encoded);
     }
-    return face;
+    CubeFaceMaker maker(edge);
+    std::vector<glm::vec3> row(edge);
+    for (std::size_t y = 0; y < edge; ++y) {
+      interruptionPoint();
+      for (std::size_t x = 0; x < edge; ++x) {
+        const auto* rgba = &texture.rgba[4 * (y * edge + x)];
+        const float alpha = static_cast<float>(std::max<int>(rgba[3], 1)) / 255.0F;
+        row[edge - 1 - x] = glm::vec3(linear[rgba[0]], linear[rgba[1]], linear[rgba[2]]) / alpha;
+      }
+      maker.addRow(row);
+    }
+    size = maker.size();
+    return maker.take();
   }
 
   [[nodiscard]] Result<CubeMap> cubeOfMap() {
@@ -184,7 +199,7 @@ class EnvironmentReader {
                                                     1.092548 * d.x * d.z,
                                                     0.546274 * (d.x * d.x - d.y * d.y)};
       glm::dvec3 sum(0.0);
-      for (std::size_t k = 0; k < kCoefficients; ++k) sum += basis[k] * sh[k] / (is_map_ ? 1.0 : kSpread[k]);
+      for (std::size_t k = 0; k < kCoefficients; ++k) sum += basis[k] * sh[k] / kSpread[k];
       image.texels.push_back(glm::vec3(glm::max(sum, 0.0)));
     }
     return image;

@@ -41,9 +41,17 @@ struct ReadWeb {
 };
 using ReadWebs = std::map<WebKey, std::shared_ptr<const ReadWeb>>;
 
-/// Pictures of skies, by where their bytes lie, and those of daylight and of extensions by what the document says.
+/// Of an extension: its JSON, and the document's images.
+struct EnvironmentKey {
+  std::string text;
+  std::vector<SharedBytes> images;
+  auto operator<=>(const EnvironmentKey&) const = default;
+};
+
+/// Pictures of skies, by where their bytes lie, and those of extensions and of daylight by what the document says.
 struct ReadSkies {
   std::map<WebKey, SharedSkyPicture> pictures;
+  std::map<EnvironmentKey, SharedSkyPicture> environments;
   std::map<std::string, SharedSkyPicture> daylights;
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -28,12 +29,22 @@ constexpr double kLeastTurbidity = 1.0, kMostTurbidity = 12.0, kUsualTurbidity =
 /// Of a sun, degrees: what is wider is a sky.
 constexpr double kWidestSun = 90.0;
 
-/// What an environment of an extension is known by: all that it may be made of.
-std::string keyOf(const ImportContext& context, const std::string& pointer) {
-  std::string key = pointer + context.document.gltf["extensions"].dump();
-  for (const auto& image : context.document.images)
-    key += " " + std::to_string(reinterpret_cast<std::uintptr_t>(image.get()));
+/// What an environment of an extension is known by: its own numbers, and its pictures. Those that are kept with it do
+/// not go, so that no other has their addresses.
+EnvironmentKey keyOf(const ImportContext& context, const std::string& pointer) {
+  const auto& gltf = context.document.gltf;
+  EnvironmentKey key{pointer + gltf.at(Json::json_pointer(pointer)).dump(), context.document.images};
+  if (const auto maps = gltf["extensions"].find("KHR_environment_map"); maps != gltf["extensions"].end())
+    key.text += maps->dump();
   return key;
+}
+
+bool isRequired(const Json& gltf, const std::string& pointer) {
+  const auto required = gltf.find("extensionsRequired");
+  if (required == gltf.end() || !required->is_array()) return false;
+  return std::ranges::any_of(*required, [&](const Json& name) {
+    return name.is_string() && pointer.starts_with("/extensions/" + name.get<std::string>() + "/");
+  });
 }
 
 /// A number of an object, and between which it must be.
@@ -46,15 +57,17 @@ class SkyReader {
  public:
   SkyReader(ImportContext& context, const Json& json) : context_(context), json_(json) {}
 
-  /// Of an extension.
+  /// Of an extension. One that may be left out, and is of a kind that is not read, is.
   Result<void> readEnvironmentAt(const std::string& pointer) {
     const auto key = keyOf(context_, pointer);
     auto ok = take(
-        pointer, known(context_.skies.daylights, before(&ReadSkies::daylights), key, true),
+        pointer, known(context_.skies.environments, before(&ReadSkies::environments), key, true),
         [&] { return readEnvironment(context_, pointer); },
-        [&](const SharedSkyPicture& picture) { context_.skies.daylights.emplace(key, picture); });
+        [&](const SharedSkyPicture& picture) { context_.skies.environments.emplace(key, picture); });
     if (ok) context_.scene.sky = std::move(sky_);
-    return ok;
+    if (ok || ok.error().code != ErrorCode::kUnsupported || isRequired(context_.document.gltf, pointer)) return ok;
+    context_.warn(pointer, "is left out, and the scene has no sky by it: " + ok.error().message);
+    return {};
   }
 
   Result<void> read() {
@@ -130,7 +143,9 @@ class SkyReader {
     if (json_.contains("bufferView")) {
       pointer += "/bufferView";
       const auto& index = json_["bufferView"];
-      const auto* view = index.is_number_integer() ? viewOf(context_.model, index.get<int>()) : nullptr;
+      const auto* view = index.is_number_integer() && index >= 0 && index <= std::numeric_limits<int>::max()
+                             ? viewOf(context_.model, index.get<int>())
+                             : nullptr;
       if (view == nullptr) return context_.bad(pointer, "is no buffer view");
       const auto& buffer = context_.document.buffers[static_cast<std::size_t>(view->buffer)];
       bytes = std::span(*buffer).subspan(view->byteOffset, view->byteLength);
@@ -275,7 +290,7 @@ class SkyReader {
     }
     const auto sun = daylight.sun.direction();
     if (sun.y <= 0.0) level = {};
-    const double on_ground = level.diffuse + (daylight.has_sun ? level.direct * std::max(0.0, sun.y) : 0.0);
+    const double on_ground = level.diffuse + level.direct * std::max(0.0, sun.y);
     const double ground = daylight.ground * on_ground / std::numbers::pi;
     if (daylight.has_sun && level.direct > 0.0) {
       const double c = std::cos(sky_.turn_rad), s = std::sin(sky_.turn_rad);  // it turns with the sky

@@ -16,7 +16,7 @@ constexpr double kDegree = kPi / 180.0;
 constexpr std::size_t kWidth = 512, kHeight = 256;
 /// Cosine of the zenith angle at the horizon, where gradations have none.
 constexpr double kLeastHeight = 1e-3;
-constexpr double kSolarWatts = 1367.0, kSolarLux = 128e3;
+constexpr double kSolarWatts = 1367.0, kSolarLux = 127.5e3;
 
 double wrapped(double degrees) { return degrees - 360.0 * std::floor(degrees / 360.0); }
 
@@ -145,6 +145,7 @@ SkyShape perezShape(double clearness, double brightness, double zenith) {
     shape.c = std::exp(std::pow(brightness * (c[0] + c[1] * zenith), c[2])) - c[3];
     shape.d = -std::exp(brightness * (d[0] + d[1] * zenith)) + d[2] + brightness * d[3];
   }
+  shape.b = std::min(shape.b, 0.0);  // above 0 the gradation has no end at the horizon
   return shape;
 }
 
@@ -163,6 +164,11 @@ std::optional<Moment> momentOf(std::string_view text) {
     const auto given = digits(text, 2, 0);
     if (!given || *given > 59) return std::nullopt;
     second = *given;
+    if (text.starts_with('.')) {  // of a second, as JavaScript writes it
+      const auto end = std::min(text.find_first_not_of("0123456789", 1), text.size());
+      if (end == 1) return std::nullopt;
+      text.remove_prefix(end);
+    }
   }
   const auto offset = offsetOf(text);
   const auto of_year = dayOfYear(*year, *month, *day);
@@ -279,8 +285,11 @@ SkyImage daylightImage(const SkyShape& shape, const glm::dvec3& sun, double diff
       arrives += nits * 2.0 * kPi / kWidth * 0.5 * (top * top - bottom * bottom);
     }
   }
-  const auto times = static_cast<float>(arrives > 0.0 ? diffuse_lux / arrives : 0.0);
-  for (std::size_t i = 0; i < kWidth * kHeight / 2; ++i) image.texels[i] *= times;
+  for (std::size_t i = 0; i < kWidth * kHeight / 2; ++i) {
+    auto& texel = image.texels[i];  // a shape that is black everywhere tells nothing of where light comes from
+    texel = arrives > 0.0 ? texel * static_cast<float>(diffuse_lux / arrives)
+                          : glm::vec3(static_cast<float>(diffuse_lux / kPi));
+  }
   return image;
 }
 

@@ -17,8 +17,10 @@ constexpr double kBright = 8.0;
 /// The mean of what is no brighter than that is found in so many steps at most, or once it changes by less than this.
 constexpr int kMostSteps = 40;
 constexpr double kSettled = 1e-3;
-/// A smaller part of all light is not told apart, and colours that differ by less than this part are one.
-constexpr double kLittle = 0.005, kSameColour = 0.02;
+/// A smaller part of all light is not told apart.
+constexpr double kLittle = 0.005;
+/// Colours are one where none of all texels differs from it by more than this part: a place may see few of them.
+constexpr double kSameColour = 0.02;
 /// Sums are made of no more columns and rows: half of the cells that rays tell apart are eight columns wide.
 constexpr std::size_t kSumWidth = 1024, kSumHeight = 512;
 
@@ -98,14 +100,19 @@ std::vector<SkyLamp> lampsOf(const SkyImage& image) {
   if (!(luminance(light) > 0.0)) return lamps;
   const auto mean = light / luminance(light);
   double shared = 0.0;
+  bool is_one_colour = true;
   forEachTexel(image, [&](std::size_t i, double solid_angle) {
-    shared += solid_angle * common(glm::dvec3(image.texels[i]), mean);
+    const glm::dvec3 texel(image.texels[i]);
+    const double in_all = common(texel, mean);
+    shared += solid_angle * in_all;
+    for (int c = 0; c < 3; ++c)
+      is_one_colour = is_one_colour && texel[c] - in_all * mean[c] <= kSameColour * luminance(texel);
   });
-  const double part = shared / luminance(light);
-  if (part > 1.0 - kSameColour) {
+  if (is_one_colour) {
     addLamp(image, light, luminance, lamps);
     return lamps;
   }
+  const double part = shared / luminance(light);
   if (part > kLittle)
     addLamp(
         image, part * light, [&](const glm::dvec3& texel) { return common(texel, mean); }, lamps);

@@ -17,6 +17,12 @@ constexpr double kFar = 4.0;
 
 using Kind = PunctualLights::Source::Kind;
 
+/// To one without a size.
+glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place) {
+  if (source.kind == Kind::kDirectional) return kFar * glm::dvec3(source.direction);
+  return glm::dvec3(source.position) - place.position;
+}
+
 }  // namespace
 
 double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
@@ -24,17 +30,18 @@ double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
   return polygonFormFactor(place.position, place.normal, std::span(lamp.corners.data(), lamp.corner_count));
 }
 
-glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place, const glm::dvec2& at) {
-  if (source.kind == Kind::kDirectional) return kFar * glm::dvec3(source.direction);
-  if (source.kind == Kind::kLamp)
-    return lampPoint(source.lamp(), place.position, place.normal, at).position - place.position;
-  return glm::dvec3(source.position) - place.position;
+SourceLook lookAt(const PunctualLights::Source& source, const LeafRays::Place& place, const glm::dvec2& at) {
+  if (source.kind == Kind::kLamp) {
+    const auto point = lampPoint(source.lamp(), place.position, place.normal, at);
+    return {point.position - place.position, point.brings};
+  }
+  return {wayTo(source, place), unhiddenSource(source, place)};
 }
 
 double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place) {
   if (source.kind == Kind::kSky) return 0.0;
   if (source.kind == Kind::kLamp) return wholeIrradiance(source.lamp(), place.position, place.normal);
-  const glm::dvec3 way = wayTo(source, place, {}), axis(source.direction);
+  const glm::dvec3 way = wayTo(source, place), axis(source.direction);
   const double distance = glm::length(way), cosine = distance > 0.0 ? glm::dot(place.normal, way) / distance : 0.0;
   if (cosine <= 0.0 || source.kind == Kind::kDirectional) return std::max(0.0, cosine);
   double strength = 1.0;

@@ -237,6 +237,7 @@ void LeafGather::takeSky(std::size_t h) {
       half.source[first + i][static_cast<std::size_t>(c)] =
           hemisphere[c] + (has_cells ? static_cast<double>(light_.sky_cells[i][c]) : 0.0);
   }
+  half.sky.clear();  // a solve that was given up may have left that of another sky
   if (!has_cells || lost_[h].empty()) return;
   half.sky.assign(sights_.leafCount(), {});
   inLeaves(sights_.leafCount(), [&](std::size_t v) {

@@ -142,13 +142,12 @@ glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
       sum += fromLampOfSize(sources_[i].lamp(), spot, mixKeys(key, ~i)) * sources_[i].intensity;
       continue;
     }
-    const auto way = wayTo(sources_[i], place, {});
-    if (glm::dot(place.normal, way) <= 0.0) continue;
     auto shaded = place;
     shaded.normal = spot.shading;
-    const double arrives = unhiddenSource(sources_[i], shaded);
-    if (arrives > 0.0 && isOpen(place, place.position + way, glm::dvec3(0.0), mixKeys(key, ~i)))
-      sum += arrives * sources_[i].intensity;
+    const auto look = lookAt(sources_[i], shaded, {});
+    if (look.brings > 0.0 && glm::dot(place.normal, look.way) > 0.0 &&
+        isOpen(place, place.position + look.way, glm::dvec3(0.0), mixKeys(key, ~i)))
+      sum += look.brings * sources_[i].intensity;
   }
   return sum;
 }

@@ -95,8 +95,9 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64
   const auto at = sobol4(0, mixKeys(key, 5));
   double factor = 0.0;
   for (std::size_t p = 0; p < 2; ++p) {
-    const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p], {at.x, at.y});
-    if (drawn.unhidden[p] > 0.0 && rays_->isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
+    const auto look = lookAt(light.sources[drawn.index], places[p], {at.x, at.y});
+    if (look.brings > 0.0 && rays_->isOpen(places[p], places[p].position + look.way))
+      factor += (p == 0 ? 1.0 : -1.0) * look.brings;
   }
   path.source = static_cast<std::uint16_t>(drawn.index);
   path.source_factor = static_cast<float>(factor / drawn.chance);

@@ -81,6 +81,33 @@ class KilledTest(StateCase):
             self.assertEqual((found["adaptive"], found["texels"]), (True, 500))
             server.kill()
 
+    def test_aSkyOutlivesAKillAndCanBeTakenBack(self):
+        def sky(server):
+            try:
+                with urllib.request.urlopen(server.url + "/sky.hdr", timeout=60 * PATIENCE) as answer:
+                    return answer.read()
+            except urllib.error.HTTPError as error:
+                return error.code  # 404: the sky is no picture
+
+        async def call(server, method, **arguments):
+            session = await Session.open(server.url)
+            return await session.call(method, **arguments)
+
+        server = self.keeper()
+        before = sky(server)
+        daylight = {"daylight": {"sky": "overcast", "altitude": 30}}
+        self.run_async(call(server, "scene.patch", patch=[{"op": "add", "path": "/extras",
+                                                           "value": {"radiositySky": daylight}}]))
+        overcast = sky(server)
+        self.assertEqual(before, 404)
+        self.assertIsInstance(overcast, bytes)
+        server.kill()
+        server = self.keeper()
+        self.assertEqual(sky(server), overcast)
+        self.run_async(call(server, "scene.undo", requestId="back"))
+        self.assertEqual(sky(server), before)
+        self.assertEqual(server.terminate(), 0, server.log())
+
     def test_undoAndHistoryGoOn(self):
         server = self.keeper()
 

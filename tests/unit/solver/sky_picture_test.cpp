@@ -139,6 +139,41 @@ TEST(SkyPicture, TurnedIsAnEditThatCastsNoRay) {
   EXPECT_EQ(room.solver->linkCounters().rays, rays);
 }
 
+// What few see may have another colour than what most see: a wall turned away from a white sun sees only the red one.
+TEST(SkyPicture, OfTwoSunsHasTheColourOfEach) {
+  constexpr double kWhite = 1e6, kRed = 1.5e4, kRadius = 0.05;
+  scene::SkyImage image{512, 256, std::vector<glm::vec3>(512 * 256)};
+  for (std::size_t i = 0; i < image.texels.size(); ++i) {
+    const double polar = (static_cast<double>(i / 512) + 0.5) / 256.0 * kPi;
+    const double x = std::sin(polar) * std::cos((2.0 * (static_cast<double>(i % 512) + 0.5) / 512.0 - 1.0) * kPi);
+    if (x > std::cos(kRadius)) image.texels[i] = glm::vec3(kWhite);
+    if (x < -std::cos(kRadius)) image.texels[i] = glm::vec3(kRed, 0.0, 0.0);
+  }
+  LightSources sources;
+  sources.sky.picture = scene::SharedSkyPicture(std::make_shared<const scene::SkyPicture>(std::move(image)));
+  // A square in the plane x = 0.5 that faces -X.
+  Solve wall({{{0.5F, 0.0F, 0.0F}, {0.0F, 0.0F, 1.0F}, {0.0F, 1.0F, 0.0F}}}, sources);
+  const auto light = wall.solver->irradiance()[wall.made.patches->surfaces[0].first_node[0]];
+  const double red = kRed * kPi * std::sin(kRadius) * std::sin(kRadius);
+  EXPECT_NEAR(static_cast<double>(light.x), red, 0.1 * red) << "texels cut the disc";
+  EXPECT_LT(light.y, 1e-3F * light.x);
+}
+
+// What a solve that was given up had found of its sky is not that of the next.
+TEST(SkyPicture, ThatGoesInTheMiddleOfASolveIsGone) {
+  LightSources two;
+  two.sky = {glm::vec3(1.0F), glm::vec3(0.5F)};
+  const Solve fresh(openCube(1, 0.5F), two);
+  Solve room(openCube(1, 0.5F), two);
+  for (int steps = 1; steps < 40; steps += 3) {
+    room.solver->setLights(pictureOf(kSlope));
+    for (int i = 0; i < steps; ++i) ASSERT_TRUE(room.solver->step());
+    room.light(two);
+    for (std::size_t surface = 0; surface < 5; ++surface)
+      EXPECT_NEAR(room.mean(surface), fresh.mean(surface), 1e-5 * fresh.mean(surface)) << steps;
+  }
+}
+
 // Its rays knew only which half of the sky they met.
 TEST(SkyPicture, ThatComesAfterTwoColoursCastsNoRay) {
   LightSources two;

@@ -10,7 +10,7 @@ import { SkyPicture } from '../../../client/web/src/view/scene/sky_picture';
 const document = (radiositySky: unknown) => ({ asset: { version: '2.0' }, extras: { radiositySky } }) as Gltf;
 
 /** Two rows, four columns: 1 above the horizon but 4 towards +Z, 0.5 below it. */
-function hdr(): Uint8Array {
+function hdr(): Uint8Array<ArrayBuffer> {
   const head = new TextEncoder().encode('#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n');
   const pixels = [129, 129, 131, 129, 128, 128, 128, 128].flatMap((exponent) => [128, 128, 128, exponent]);
   return new Uint8Array([...head, ...pixels]);
@@ -73,6 +73,23 @@ it('reads pictures as the server sends them, and draws them whole', () => {
   expect(background.luminanceAt(camera, 0, 0)).toBeCloseTo(luminance([9, 9, 9]), 9);
 });
 
+it('asks again for a picture that did not come', async () => {
+  vi.useFakeTimers();
+  try {
+    let asked = 0;
+    const shown: (number | undefined)[] = [];
+    const sky = new SkyFetch({
+      fetch: () => (++asked < 3 ? Promise.reject(new Error('gone')) : Promise.resolve(new Response(hdr()))),
+      show: (bytes) => shown.push(bytes?.length),
+    });
+    sky.onDocument(document({ bufferView: 1 }), true);
+    await vi.runAllTimersAsync();
+    expect([asked, shown]).toEqual([3, [hdr().length]]);
+  } finally {
+    vi.useRealTimers();
+  }
+});
+
 it('fetches a picture once the document names another, and none for colours', async () => {
   vi.useFakeTimers();
   try {
@@ -85,17 +102,23 @@ it('fetches a picture once the document names another, and none for colours', as
       },
       show: (bytes) => shown.push(bytes?.length),
     });
-    sky.onDocument(document({ upper: [1, 1, 1] }));
-    sky.onDocument(document({ bufferView: 1 }));
-    sky.onDocument(document({ bufferView: 1, rotation: 1 }));
+    sky.onDocument(document({ upper: [1, 1, 1] }), true);
+    sky.onDocument(document({ bufferView: 1 }), false);
+    sky.onDocument(document({ bufferView: 1, rotation: 1 }), false);
     await vi.runAllTimersAsync();
     expect(asked).toEqual(['/sky.hdr']);
     expect(shown).toEqual([hdr().length]);
-    sky.onDocument(document({ bufferView: 1, rotation: 1 }));
+    sky.onDocument(document({ bufferView: 1, rotation: 1 }), false);
     await vi.runAllTimersAsync();
     expect(asked).toHaveLength(1);
-    sky.onDocument(document(undefined));
-    expect(shown).toEqual([hdr().length, undefined]);
+    // Another scene, whose picture has the same number.
+    sky.onDocument(document({ bufferView: 1, rotation: 1 }), true);
+    await vi.runAllTimersAsync();
+    expect(asked).toHaveLength(2);
+    sky.onDocument(document(undefined), false);
+    expect(shown).toEqual([hdr().length, hdr().length, undefined]);
+    sky.onDocument(document(undefined), true);
+    expect(shown).toHaveLength(3);
   } finally {
     vi.useRealTimers();
   }

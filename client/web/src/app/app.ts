@@ -174,7 +174,7 @@ export class App {
       frameSelection: () => this.view.frameNode(this.edit.selection?.node),
       loadFile: (file) => void this.scene.loadFile(file),
       upload: (file) => this.scene.send(file),
-      documentChanged: (gltf) => this.sky.onDocument(gltf),
+      documentChanged: (gltf, isWhole) => this.sky.onDocument(gltf, isWhole),
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
   }

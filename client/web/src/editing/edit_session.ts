@@ -30,7 +30,8 @@ export interface EditHost {
   /** Keeps a file on the server and returns its URL there; rejects with the reason that the server gives. */
   upload(file: File): Promise<string>;
   /** The document has come, or changed. */
-  documentChanged(gltf: Gltf): void;
+  /** `isWhole`: it has come from the server, maybe as another one. */
+  documentChanged(gltf: Gltf, isWhole: boolean): void;
   notAccepted(text: string, wanted: string): void;
 }
 
@@ -228,7 +229,7 @@ export class EditSession {
   private onChanged(pointers: string[]): void {
     const { gltf } = this.document;
     this.host.picture.applyDocument(gltf, pointers);
-    this.host.documentChanged(gltf);
+    this.host.documentChanged(gltf, pointers.length === 0);
     if (pointers.length === 0) {
       // The document may come after the picture: an object that was clicked meanwhile stays selected, unless the server
       // has come back with another scene, in which its number means another object.

@@ -5,6 +5,8 @@ import { pictureKey } from '../document/skies';
 
 /** An edit is shown here before the server has it; a picture that is turned changes many times a second. */
 const WAIT_MS = 400;
+/** Before a picture is asked for again that did not come. */
+const RETRY_MS = 5000;
 
 export interface SkyHost {
   fetch(path: string, init?: RequestInit): Promise<Response>;
@@ -19,15 +21,19 @@ export class SkyFetch {
 
   constructor(private readonly host: SkyHost) {}
 
-  /** The document has come, or changed. */
-  onDocument(gltf: Gltf): void {
+  /** The document has come as a whole, or changed: in another one the same words may mean another picture. */
+  onDocument(gltf: Gltf, isWhole: boolean): void {
     const key = pictureKey(gltf);
-    if (key === this.key) return;
+    if (key === this.key && !(isWhole && key !== undefined)) return;
     this.key = key;
     clearTimeout(this.timer);
     this.abort?.abort();
     if (key === undefined) this.host.show(undefined);
-    else this.timer = setTimeout(() => void this.fetch(), WAIT_MS);
+    else this.ask(WAIT_MS);
+  }
+
+  private ask(waitMs: number): void {
+    this.timer = setTimeout(() => void this.fetch(), waitMs);
   }
 
   private async fetch(): Promise<void> {
@@ -37,8 +43,8 @@ export class SkyFetch {
       const bytes = new Uint8Array(await response.arrayBuffer());
       if (!abort.signal.aborted) this.host.show(bytes);
     } catch {
-      // The next change, or the next scene, asks again; until then the sky stays as it is.
-      if (!abort.signal.aborted) this.key = undefined;
+      // Until it comes the sky stays as it is.
+      if (!abort.signal.aborted) this.ask(RETRY_MS);
     }
   }
 }

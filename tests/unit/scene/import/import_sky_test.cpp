@@ -84,7 +84,7 @@ TEST(ImportSky, PicturesBecomeABufferView) {
   EXPECT_EQ(sky->strength, 3.0F);
   EXPECT_DOUBLE_EQ(sky->turn_rad, 0.5 * kPi);
   EXPECT_EQ(sky->upper, glm::vec3(1.0F));
-  EXPECT_EQ(sky->picture->image().texels[1], glm::vec3(2.0F));
+  EXPECT_EQ(sky->picture->image().texels[1], glm::vec3(2.0F * 128.5F / 128.0F));
 }
 
 TEST(ImportSky, OfPicturesTellsWhatIsWrong) {
@@ -181,8 +181,8 @@ GltfBuilder imageBased(const std::vector<std::array<std::uint8_t, 4>>& colours) 
 }
 
 TEST(ImportEnvironment, ReadsACubeOfImages) {
-  const std::vector<std::array<std::uint8_t, 4>> colours{{255, 0, 0, 255}, {0, 255, 0, 255},  {0, 0, 255, 255},
-                                                         {51, 51, 51, 51}, {255, 255, 0, 51}, {0, 0, 0, 255}};
+  const std::vector<std::array<std::uint8_t, 4>> colours{{255, 0, 0, 255},    {0, 255, 0, 255},  {0, 0, 255, 255},
+                                                         {128, 128, 128, 51}, {255, 255, 0, 51}, {128, 128, 128, 255}};
   auto builder = imageBased(colours);
   const auto scene = imported(builder);
   ASSERT_TRUE(scene.sky && scene.sky->picture);
@@ -190,8 +190,10 @@ TEST(ImportEnvironment, ReadsACubeOfImages) {
   EXPECT_LT(glm::distance(seen(scene, {1, 0, 0}), glm::dvec3(10, 0, 0)), 0.01);
   EXPECT_LT(glm::distance(seen(scene, {-1, 0, 0}), glm::dvec3(0, 10, 0)), 0.01);
   EXPECT_LT(glm::distance(seen(scene, {0, 1, 0}), glm::dvec3(0, 0, 10)), 0.01);
-  EXPECT_LT(glm::distance(seen(scene, {0, -1, 0}), glm::dvec3(10, 10, 10)), 0.01) << "divided by alpha";
+  const double half = 10.0 * std::pow(128.0 / 255.0, 2.2);
+  EXPECT_LT(glm::distance(seen(scene, {0, -1, 0}), glm::dvec3(5.0 * half)), 0.01) << "divided by alpha";
   EXPECT_LT(glm::distance(seen(scene, {0, 0, 1}), glm::dvec3(50, 50, 0)), 0.1);
+  EXPECT_LT(glm::distance(seen(scene, {0, 0, -1}), glm::dvec3(2.1586)), 0.01) << "encoded as sRGB";
   for (const auto& warning : scene.warnings) EXPECT_THAT(warning, testing::Not(HasSubstr("is ignored")));
   auto& light = builder.gltf["extensions"]["EXT_lights_image_based"]["lights"][0];
   light["rotation"] = {0.0, std::sqrt(0.5), 0.0, std::sqrt(0.5)};  // a quarter, from +Z towards +X
@@ -253,11 +255,16 @@ TEST(ImportEnvironment, ReadsACubeOfKtx) {
   EXPECT_NEAR(sky->picture->radiance({0, 0, 1}).x, 8.0F, 1e-3F);
   EXPECT_NEAR(sky->picture->radiance({0, 1, 0}).x, 4.0F, 1e-3F);
   EXPECT_NEAR(sky->picture->radiance({0, 1, 0}).z, 1.0F, 1e-3F);
-  // One that cannot be read is stood in for by its irradiance.
+  // One that cannot be read is left out, or stood in for by its irradiance; one that is required is refused.
   builder.gltf["images"][0]["uri"] = dataUri(ktx(145));
+  const auto dark = imported(builder);
+  EXPECT_FALSE(dark.sky && dark.sky->picture);
+  EXPECT_THAT(dark.warnings, testing::Contains(HasSubstr("no sky by it: its format (145)")));
+  builder.gltf["extensionsRequired"] = {"KHR_environment_map"};
   expectRefused(builder, ErrorCode::kUnsupported, "/extensions/KHR_environment_map/cubemaps/0", "format (145)");
+  // Irradiance under 1 nit is pi: all of it is in the first coefficient, times 2 sqrt(pi). The cubemap doubles it.
   Json coefficients = Json::array();
-  for (int i = 0; i < 9; ++i) coefficients.push_back({i == 0 ? 2.0 * std::sqrt(kPi) : 0.0, 0, 0});
+  for (int i = 0; i < 9; ++i) coefficients.push_back({i == 0 ? kPi * 2.0 * std::sqrt(kPi) : 0.0, 0, 0});
   builder.gltf["extensions"]["KHR_environment_map"]["environment_maps"][0]["irradianceCoefficients"] = coefficients;
   const auto even = imported(builder);
   EXPECT_NEAR(even.sky->picture->image().texels[100].x, 2.0F, 1e-3F);
@@ -266,6 +273,36 @@ TEST(ImportEnvironment, ReadsACubeOfKtx) {
   cut.pop_back();
   builder.gltf["images"][0]["uri"] = dataUri(cut);
   expectRefused(builder, ErrorCode::kInvalidScene, "/extensions/KHR_environment_map/cubemaps/0", "ends before");
+}
+
+// Six pictures in which every texel tells its face, column and row.
+TEST(ImportEnvironment, HasItsFacesAsTheExtensionSaysTheyLie) {
+  auto builder = imageBased(std::vector<std::array<std::uint8_t, 4>>(6, {0, 0, 0, 255}));
+  for (std::size_t f = 0; f < 6; ++f) {
+    std::vector<std::uint8_t> pixels;
+    for (int i = 0; i < 16; ++i)
+      for (const int value : {i % 4 < 2 ? 255 : 0, i / 4 < 2 ? 255 : 0, 255, 255})
+        pixels.push_back(static_cast<std::uint8_t>(value));
+    const auto png = encodePng(4, 4, 4, pixels);
+    builder.gltf["images"][f]["uri"] = dataUri({png.begin(), png.end()});
+  }
+  const auto sky = imported(builder).sky;
+  ASSERT_TRUE(sky && sky->picture);
+  // Seen from within, a face has its left at the right of its picture: red is the right half there, green the upper.
+  struct Face {
+    glm::dvec3 to, right, up;
+  };
+  const glm::dvec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+  for (const auto& [to, right, up] : {Face{x, -z, y}, {-x, z, y}, {y, x, -z}, {-y, x, z}, {z, x, y}, {-z, -x, y}}) {
+    for (const double across : {-0.5, 0.5}) {
+      for (const double along : {-0.5, 0.5}) {
+        const auto seen = sky->picture->radiance(glm::normalize(to + across * right + along * up));
+        // Interpolated between texels that are a quarter of a face wide.
+        EXPECT_NEAR(seen.x, across > 0.0 ? 10.0F : 0.0F, 1.5F) << to.x << to.y << to.z;
+        EXPECT_NEAR(seen.y, along > 0.0 ? 10.0F : 0.0F, 1.5F) << to.x << to.y << to.z;
+      }
+    }
+  }
 }
 
 TEST(ImportLights, ADirectionalLightMayHaveAnAngle) {

@@ -6,6 +6,7 @@
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfOutputFile.h>
+#include <ImfPreviewImage.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -48,10 +49,11 @@ class Buffer : public Imf::OStream {
 
 /// One colour, but for the first pixel; a data window that begins elsewhere.
 std::string exr(int width, int height, float first, Imf::Compression compression = Imf::ZIP_COMPRESSION,
-                const std::vector<std::string>& channels = {"R", "G", "B"}) {
+                const std::vector<std::string>& channels = {"R", "G", "B"}, bool has_preview = false) {
   const Imath::Box2i window(Imath::V2i(-3, 5), Imath::V2i(width - 4, height + 4));
   Imf::Header header(window, window);
   header.compression() = compression;
+  if (has_preview) header.setPreviewImage(Imf::PreviewImage(2, 2));
   std::vector<float> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 2.0F);
   pixels[0] = first;
   Imf::FrameBuffer buffer;
@@ -70,21 +72,25 @@ std::string exr(int width, int height, float first, Imf::Compression compression
 }
 
 TEST(HdrFile, IsReadFlatAndPacked) {
-  const std::string pixel("\x80\x40\x20\x81", 4);  // 1, 0.5, 0.25
+  const std::string pixel("\x80\x40\x20\x81", 4);  // 128.5, 64.5 and 32.5 / 128
   const auto flat = read(hdr("-Y 1 +X 2", pixel + pixel));
   ASSERT_TRUE(flat) << flat.error().text();
   EXPECT_EQ(flat->width, 2U);
-  EXPECT_EQ(flat->texels[1], glm::vec3(1.0F, 0.5F, 0.25F));
+  const auto colour = glm::vec3(128.5F, 64.5F, 32.5F) / 128.0F;
+  EXPECT_EQ(flat->texels[1], colour);
   const auto repeated = read(hdr("-Y 1 +X 3", pixel + std::string("\x01\x01\x01\x02", 4)));
   ASSERT_TRUE(repeated) << repeated.error().text();
-  EXPECT_EQ(repeated->texels[2], glm::vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_EQ(repeated->texels[2], colour);
   std::string row("\x02\x02\x00\x08", 4);
   for (const char value : {'\x80', '\x40', '\x20'}) row += std::string("\x88", 1) + value;
   row += std::string("\x08\x81\x81\x81\x81\x81\x81\x81\x82", 9);
   const auto packed = read(hdr("-Y 2 +X 8", row + row, "EXPOSURE=2\n# made by hand\n"));
   ASSERT_TRUE(packed) << packed.error().text();
-  EXPECT_EQ(packed->texels[9], glm::vec3(0.5F, 0.25F, 0.125F)) << "what the exposure multiplied is divided by it";
-  EXPECT_EQ(packed->texels[15], glm::vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_EQ(packed->texels[9], 0.5F * colour) << "what the exposure multiplied is divided by it";
+  EXPECT_EQ(packed->texels[15], colour);
+  const auto corrected = read(hdr("-Y 1 +X 1", pixel, "COLORCORR= 1 2 0.5\n"));
+  ASSERT_TRUE(corrected) << corrected.error().text();
+  EXPECT_EQ(corrected->texels[0], colour / glm::vec3(1.0F, 2.0F, 0.5F));
 }
 
 TEST(HdrFile, IsRefusedWithAReason) {
@@ -98,7 +104,8 @@ TEST(HdrFile, IsRefusedWithAReason) {
   EXPECT_THAT(refusal(hdr("-Y 2 +X 1", pixel)), HasSubstr("row 1 of 2"));
   EXPECT_THAT(refusal(hdr("-Y 1 +X 8", std::string("\x02\x02\x00\x08\x89\x01", 6))), HasSubstr("row 0"));
   EXPECT_THAT(refusal(hdr("-Y 1 +X 1", std::string("\x80\x40\x20\xFF", 4))), HasSubstr("pixel (0, 0)"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", pixel, "EXPOSURE=0\n")), HasSubstr("EXPOSURE"));
+  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", pixel, "EXPOSURE=0\n")), HasSubstr("EXPOSURE must be a number"));
+  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", pixel, "COLORCORR=1 2\n")), HasSubstr("COLORCORR must be three"));
   // Four gigabytes, decoded, in a hundred bytes; and what would wrap round.
   EXPECT_THAT(refusal(hdr("-Y 16384 +X 16384", pixel)), HasSubstr("16384 x 16384 pixels"));
   EXPECT_THAT(refusal(hdr("-Y 18446744073709551615 +X 18446744073709551615", pixel)), HasSubstr("pixels"));
@@ -143,6 +150,56 @@ TEST(ExrFile, IsRefusedWithAReason) {
   EXPECT_THAT(refusal(deep), HasSubstr("one part"));
 }
 
+/// An attribute as a header has it.
+std::string attribute(const std::string& name, const std::string& type, const std::string& value) {
+  std::string text = name + '\0' + type + '\0';
+  for (unsigned shift = 0; shift < 32; shift += 8) text += static_cast<char>(value.size() >> shift & 0xFFU);
+  return text + value;
+}
+
+// Who reads an attribute by what its type takes, and who by what its size says, would not agree on what comes next.
+TEST(ExrFile, IsRefusedWhereItsHeaderCanBeReadInTwoWays) {
+  const auto good = exr(64, 32, 2.0F);
+  const auto with = [&](const std::string& more) { return good.substr(0, 8) + more + good.substr(8); };
+  EXPECT_THAT(refusal(with(attribute("dataWindow", "box2i", std::string(4, '\0')))), HasSubstr("dataWindow"));
+  EXPECT_THAT(refusal(with(attribute("dataWindow", "box2i", std::string(16, '\0')))), HasSubstr("dataWindow twice"));
+  EXPECT_THAT(refusal(with(attribute("screenWindowCenter", "m44d", std::string(8, '\0')))), HasSubstr("not as v2f"));
+  EXPECT_THAT(refusal(with(attribute("envmap", "envmap", std::string(1, '\1')))), HasSubstr("it is a cube"));
+  std::string channels;
+  for (int i = 0; i < 65; ++i) channels += std::string(1, static_cast<char>('0' + i)) + '\0' + std::string(16, '\0');
+  EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels + '\0')), HasSubstr("more than 64"));
+  EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels.substr(0, 170))),
+              HasSubstr("broken"));
+}
+
+// What else a header has is skipped by its size, whatever it claims of itself: the offsets of lines stay.
+TEST(ExrFile, IsReadWithoutAttributesThatNobodyNeeds) {
+  const auto good = exr(4, 2, 2.0F, Imf::NO_COMPRESSION, {"R", "G", "B"}, true);
+  const auto preview = good.find(std::string("preview\0preview\0", 16));
+  ASSERT_NE(preview, std::string::npos);
+  auto hostile = good;
+  const std::uint32_t edge = 1U << 15U;
+  std::memcpy(hostile.data() + preview + 20, &edge, sizeof(edge));
+  std::memcpy(hostile.data() + preview + 24, &edge, sizeof(edge));
+  const auto image = read(hostile);
+  ASSERT_TRUE(image) << image.error().text();
+  EXPECT_EQ(image->texels[0], glm::vec3(2.0F));
+}
+
+// 163 channels, or one row of tiles, of a picture of one kilobyte took gigabytes.
+TEST(ExrFile, MayNotHoldManyLinesAtOnce) {
+  const auto good = exr(64, 32, 2.0F);
+  const auto window = good.find(std::string("dataWindow\0box2i\0", 17)) + 21;
+  auto tiled = good;
+  const std::int32_t right = 16'380, bottom = 8196;  // from -3 and 5 on: as large as a sky may be
+  std::memcpy(tiled.data() + window + 8, &right, sizeof(right));
+  std::memcpy(tiled.data() + window + 12, &bottom, sizeof(bottom));
+  const std::uint32_t size[2] = {16'384, 8192};
+  const std::string tile(reinterpret_cast<const char*>(size), sizeof(size));
+  tiled = tiled.substr(0, 8) + attribute("tiles", "tiledesc", tile + '\0') + tiled.substr(8);
+  EXPECT_THAT(refusal(tiled), HasSubstr("more than 64 MiB"));
+}
+
 // What is wider than a SkyImage is reduced as it is read.
 TEST(SkyFile, IsReducedAsItIsRead) {
   std::string pixels;
@@ -150,8 +207,8 @@ TEST(SkyFile, IsReducedAsItIsRead) {
   const auto image = read(hdr("-Y 1 +X 5000", pixels));
   ASSERT_TRUE(image) << image.error().text();
   EXPECT_EQ(image->width, SkyImageMaker::kMostWidth);
-  EXPECT_FLOAT_EQ(image->texels.front().x, 1.0F);
-  EXPECT_FLOAT_EQ(image->texels.back().x, 2.0F);
+  EXPECT_FLOAT_EQ(image->texels.front().x, 128.5F / 128.0F);
+  EXPECT_FLOAT_EQ(image->texels.back().x, 128.5F / 64.0F);
 }
 
 }  // namespace
