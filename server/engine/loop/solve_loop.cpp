@@ -172,8 +172,8 @@ void SolveLoop::takeTurn() {
       lit_->giveUpSurface();
       return updateStatus(true);
     }
-    if (refinement_) return endWithoutMemory();
     if (std::exchange(coarser_, nullptr)) return log::warn("out of memory: the light of coarser texels is forgotten");
+    if (refinement_) return endWithoutMemory();
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;

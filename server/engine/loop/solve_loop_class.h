@@ -138,6 +138,9 @@ class SolveLoop final : public Engine {
   void beginRefinement(SolveState otherwise, std::string why);
   void refineSlice();
   void judgeTexels();
+  [[nodiscard]] bool isWorseThanCoarser(double error) const;
+  void takeBetterLayout(double error);             ///< that of coarser texels, where light that is so far off is worse
+  [[nodiscard]] std::string lackOfTexels() const;  ///< once they are measured
   void endRefinement(SolveState state, std::string why);
   void orderRefined(WantedTexels wanted, double aim);
   void giveUpTexels(const std::string& why);
@@ -333,9 +336,9 @@ class SolveLoop final : public Engine {
   std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
   Upkeep upkeep_;
   std::optional<Refinement> refinement_;  // of the solve under way
-  std::unique_ptr<LitScene> coarser_;     // measured, and better than what is solved for yet; null: that is better
-  int refined_times_ = 0;                 // since the scene was loaded or edited
-  std::size_t lost_told_ = 0;             // warnings of lost light that were logged since the load: edits log no others
+  std::unique_ptr<LitScene> coarser_;  // measured, and better than lit_ as far as that is known; null: that is better
+  int refined_times_ = 0;              // since the scene was loaded or edited
+  std::size_t lost_told_ = 0;          // warnings of lost light that were logged since the load: edits log no others
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
   std::atomic<bool> waiting_{true};

@@ -32,7 +32,10 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
   disposer_.dispose(std::exchange(former_, nullptr));
   auto before = std::exchange(lit_, std::move(*made));
-  disposer_.dispose(relation == Relation::kRefined ? std::exchange(coarser_, std::move(before)) : std::move(before));
+  // Of two that were measured the better one stays beside the third.
+  const bool keeps_coarser = before && before->surfaceError() && isWorseThanCoarser(before->surfaceError()->total);
+  if (relation == Relation::kRefined && !keeps_coarser) before = std::exchange(coarser_, std::move(before));
+  disposer_.dispose(std::move(before));
   return affected;
 }
 

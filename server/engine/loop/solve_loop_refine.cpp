@@ -39,7 +39,6 @@ double inTwoDigits(double value) {
 }  // namespace
 
 void SolveLoop::beginRefinement(SolveState otherwise, std::string why) {
-  disposer_.dispose(std::exchange(coarser_, nullptr));
   refinement_.emplace(Refinement{otherwise, std::move(why), nullptr});
   publishLightmaps(false);
   tellProgress(true);
@@ -65,31 +64,49 @@ void SolveLoop::refineSlice() {
 void SolveLoop::judgeTexels() {
   const auto surface = *lit_->surfaceError();
   const double left = surface.total, aim = aimAtSurface(surface, settings_.target_error);
+  if (coarser_ && !isWorseThanCoarser(left)) disposer_.dispose(std::exchange(coarser_, nullptr));
   if (left <= aim) return endRefinement(SolveState::kConverged, {});
   const bool is_reached = left <= settings_.target_error;  // though not by 95 % of places
   if (is_reached && (isOutOfTime() || refinement_->otherwise == SolveState::kLimited))
     return endRefinement(SolveState::kConverged, {});
   if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   auto wanted = lit_->wantedTexels(aim);
-  const auto texels = static_cast<double>(lit_->patchCount());
   const bool is_worthwhile = wanted.present > 0.0 && wanted.error <= kWorthwhile * wanted.present;
   if (lit_->isDraft() && (!is_worthwhile || wanted.present < kFineEnough * aim)) return keepTexels();
   const bool can_solve = refinement_->otherwise != SolveState::kLimited && !lit_->isDraft();
   const double fine = refined_times_ < kMostLayouts && is_worthwhile ? kFineEnough : 1.0;
   if (can_solve && wanted.present < fine * aim && lit_->solveCloser(noiseShare(left, wanted.present, aim)))
-    return dropRefinement();
+    return callOffRefinement();
   if (refined_times_ < kMostLayouts && is_worthwhile) return orderRefined(std::move(wanted), aim);
   if (is_reached) return endRefinement(SolveState::kConverged, {});
   if (refinement_->otherwise == SolveState::kLimited) return endRefinement(SolveState::kLimited, refinement_->why);
-  auto why = fmt::format("texels: {:.0f} of {} are used, and {:.2g} % are left at the surface", texels,
-                         settings_.texels, 100.0 * left);
+  takeBetterLayout(left);
+  endRefinement(SolveState::kLimited, lackOfTexels());
+}
+
+std::string SolveLoop::lackOfTexels() const {
+  auto why = fmt::format("texels: {} of {} are used, and {:.2g} % are left at the surface", lit_->patchCount(),
+                         settings_.texels, 100.0 * lit_->surfaceError()->total);
   const auto enough = lit_->enoughTexels(settings_.target_error);
   if (enough && *enough > static_cast<double>(settings_.texels))
     why += fmt::format("; about {:.0f} would reach {:.2g} %", inTwoDigits(*enough), 100.0 * settings_.target_error);
-  endRefinement(SolveState::kLimited, std::move(why));
+  return why;
+}
+
+bool SolveLoop::isWorseThanCoarser(double error) const {
+  return coarser_ && coarser_->surfaceError() && error > coarser_->surfaceError()->total;
+}
+
+/// Light on many texels is worse than that on fewer was where time or memory end before it is solved for as well.
+void SolveLoop::takeBetterLayout(double error) {
+  if (!isWorseThanCoarser(error)) return;
+  const auto back = relight(std::move(coarser_), Relation::kResumed);
+  if (!back) log::warn("the light of coarser texels, which is better, cannot be had: {}", back.error().text());
 }
 
 void SolveLoop::endRefinement(SolveState state, std::string why) {
+  callOffRefinement();
+  if (state != SolveState::kConverged && lit_->surfaceError()) takeBetterLayout(lit_->surfaceError()->total);
   dropRefinement();
   failure_ = std::move(why);
   if (!failure_.empty()) log::warn("the solve ends above its target error: {}", failure_);
@@ -143,7 +160,7 @@ void SolveLoop::takeRefined() {
   seconds_ += refinement_->job->seconds();
   const auto& measured = lit_->surfaceError();
   const double shown = measured ? measured->total : 1.0;
-  dropRefinement();
+  callOffRefinement();
   if (isOutOfTime()) return endRefinement(SolveState::kTimeLimit, {});
   ++refined_times_;
   const auto lit = relight(std::move(*made), Relation::kRefined, {}, uploadOfEdit());
@@ -181,10 +198,7 @@ bool SolveLoop::isOutOfTime() const {
 }
 
 void SolveLoop::stopInTime() {
-  if (coarser_ && coarser_->surfaceError() && lit_->solver().error().total > coarser_->surfaceError()->total) {
-    const auto back = relight(std::move(coarser_), Relation::kResumed);
-    if (!back) log::warn("the light of coarser texels, which is better, cannot be had: {}", back.error().text());
-  }
+  takeBetterLayout(lit_->solver().error().total);
   dropRefinement();
   endSolve(SolveState::kTimeLimit);
 }
