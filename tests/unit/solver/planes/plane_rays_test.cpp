@@ -20,21 +20,24 @@ PlaneGrid levelGrid(std::uint32_t columns, std::uint32_t rows) {
   return {{-0.5, -0.2, -0.5}, {1.0, 0.0, 0.0}, {0.0, 0.0, 1.0}, {0.0, 1.0, 0.0}, columns, rows};
 }
 
+test::Quad floor(float reflectance = 0.0F) {
+  test::Quad quad{{-0.5F, -0.4F, 0.5F}, {1.0F, 0.0F, 0.0F}, {0.0F, 0.0F, -1.0F}};
+  quad.reflectance = glm::vec3(reflectance);
+  return quad;
+}
+
+test::Quad lamp(float emission) {
+  test::Quad quad{{-0.1F, 0.4F, -0.1F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.0F, 0.2F}};
+  quad.width = quad.height = 1;
+  quad.emission = glm::vec3(emission);
+  return quad;
+}
+
 class PlaneRaysTest : public testing::Test {
  protected:
-  explicit PlaneRaysTest(std::vector<test::Quad> quads = {floor()}) : scene_(test::makeQuadScene(quads)) {
+  PlaneRaysTest() : PlaneRaysTest({floor()}) {}
+  explicit PlaneRaysTest(const std::vector<test::Quad>& quads) : scene_(test::makeQuadScene(quads)) {
     irradiance_.assign(scene_.patches->nodeCount(), glm::vec3(0.0F));
-  }
-  static test::Quad floor(float reflectance = 0.0F) {
-    test::Quad quad{{-0.5F, -0.4F, 0.5F}, {1.0F, 0.0F, 0.0F}, {0.0F, 0.0F, -1.0F}};
-    quad.reflectance = glm::vec3(reflectance);
-    return quad;
-  }
-  static test::Quad lamp(float emission) {
-    test::Quad quad{{-0.1F, 0.4F, -0.1F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.0F, 0.2F}};
-    quad.width = quad.height = 1;
-    quad.emission = glm::vec3(emission);
-    return quad;
   }
   [[nodiscard]] PlaceLight light() const {
     return PlaceLight({*scene_.patches, nullptr, nullptr, scene_.materials, sources_, irradiance_, difference_});
