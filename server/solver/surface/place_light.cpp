@@ -92,12 +92,12 @@ PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) co
 }
 
 glm::dvec3 PlaceLight::arriving(const Spot& spot, std::uint64_t key) const {
-  return direct(spot, mixKeys(key, 1)) + reflected(spot, mixKeys(key, 2), kRays).light;
+  return direct(spot, mixKeys(key, 1), Looks::kFewer) + reflected(spot, mixKeys(key, 2), kRays).light;
 }
 
 PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, std::uint32_t rays) const {
   const auto gathered = reflected(spot, mixKeys(key, 2), rays);
-  return {direct(spot, mixKeys(key, 1)), gathered.light, gathered.off};
+  return {direct(spot, mixKeys(key, 1), Looks::kAll), gathered.light, gathered.off};
 }
 
 /// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
@@ -146,14 +146,14 @@ glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, 
   if (value == LeafRays::kNothing) return glm::dvec3(0.0);
   if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
-  const auto arrives = direct(there, mixKeys(key, 3)) + reflectedBy(there, mixKeys(key, 4), steps - 1);
+  const auto arrives = direct(there, mixKeys(key, 3), Looks::kFewer) + reflectedBy(there, mixKeys(key, 4), steps - 1);
   return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;
 }
 
-glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
+glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key, Looks looks) const {
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < lamps_.size(); ++i)
-    sum += fromLamp(lamps_[i], spot, mixKeys(key, i)) * glm::dvec3(lamps_[i].emission);
+    sum += fromLamp(lamps_[i], spot, mixKeys(key, i), looks) * glm::dvec3(lamps_[i].emission);
   if (many_) sum += fromSomeLamps(spot, key);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const auto& place = spot.place;
@@ -196,13 +196,14 @@ double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint6
 }
 
 /// For an emission of one: the exact form factor of all of it, times the part of that which is seen.
-double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const {
+double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const {
   const auto& place = spot.place;
   if (unhiddenLight(lamp, place) <= 0.0) return 0.0;
   const std::span corners(lamp.corners.data(), lamp.corner_count);
   const auto factors = formFactorsAboveBoth(place.position, place.normal, spot.shading, corners);
   if (factors.shading <= 0.0) return 0.0;
   std::array<double, 2> weights{};
+  if (looks == Looks::kAll) return factors.shading * seenPart(lamp, spot, key, 0, kAllLooks, weights);
   const double first = seenPart(lamp, spot, key, 0, kFirstLooks, weights);
   const bool agree = first <= 0.0 || first >= 1.0;
   if (agree && uniformFromKey(key) >= kAskAgain) return factors.shading * first;

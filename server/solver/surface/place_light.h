@@ -60,7 +60,8 @@ class PlaceLight {
   /// seen in part; of more than kEachLamp of them 64 in all.
   [[nodiscard]] glm::dvec3 arriving(const Spot& spot, std::uint64_t key) const;
 
-  /// The same by so many rays, in parts. `off` is what the reflected part of a solve with the halves of
+  /// The same by so many rays, in parts, and by kMostLooks looks at every lamp, so that several tell the variance even
+  /// at the edges of shadows. `off` is what the reflected part of a solve with the halves of
   /// SolvedScene::difference is off by, one standard deviation of either sign; 0 where that is not known.
   struct Arriving {
     glm::dvec3 direct{0.0}, reflected{0.0}, off{0.0};
@@ -84,9 +85,11 @@ class PlaceLight {
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
-  [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key) const;
+  /// How many points of a lamp look: all, or fewer where the first agree.
+  enum class Looks { kAll, kFewer };
+  [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] double fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
-  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] glm::dvec3 fromSomeLamps(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] double seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
                                 std::uint32_t end, std::array<double, 2>& weights) const;

@@ -13,7 +13,7 @@ import {
 } from 'three';
 import type { Gltf } from '../document/gltf';
 import { pause } from '../page/pause';
-import type { Sky } from '../protocol/messages';
+import type { MeasuredPlane, Sky } from '../protocol/messages';
 import { Brightness } from './exposure/brightness';
 import { CameraRig } from './controls/camera_rig';
 import type { ExposureMeter } from './exposure/exposure';
@@ -74,6 +74,7 @@ export class Viewer {
   readonly brightness: Brightness;
   mode: ViewMode | undefined;
   private people: People | undefined;
+  private measured: { planes: readonly MeasuredPlane[]; document: Gltf } | undefined;
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
   private readonly programs: Programs;
@@ -242,6 +243,18 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
+  /** Shows the light on measuring planes; `document`: that they were measured in. */
+  showPlanes(planes: readonly MeasuredPlane[], document: Gltf): void {
+    this.measured = { planes, document: structuredClone(document) };
+    this.takePlanes();
+    this.shown?.applyDocument(document);
+    this.moved();
+  }
+
+  private takePlanes(): void {
+    if (this.measured) this.shown?.planes.take(this.measured.planes, this.measured.document);
+  }
+
   /** Draws where others look from into the picture. */
   showPeople(people: People): void {
     this.people = people;
@@ -278,7 +291,7 @@ export class Viewer {
 
   /** A new lamp has a marker before the geometry has its node. */
   private objectOf(node: number): Object3D | undefined {
-    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node);
+    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node) ?? this.shown?.planes.get(node);
   }
 
   private frame(now: number): void {
@@ -361,6 +374,7 @@ export class Viewer {
   private setSigns(visible: boolean): void {
     this.gizmo.setVisible(visible && !this.mode?.flat);
     for (const lamp of this.shown?.lamps.values() ?? []) lamp.visible = visible;
+    this.shown?.planes.setVisible(visible);
     if (this.people) this.people.root.visible = visible;
   }
 
@@ -393,6 +407,7 @@ export class Viewer {
     }
     if (scene) {
       this.world.add(scene.root);
+      this.takePlanes();
       this.rig.setBounds(scene.bounds);
     }
     this.pagesView.show(this.mode?.flat ? scene?.set : undefined); // the old pages are gone

@@ -148,14 +148,16 @@ TEST_F(PlaneOverAChequeredFloor, StatedErrorsAreWhatPointsAreOffBy) {
   for (int i = 0; i < kOfTruth; ++i) many.addRounds();
   const auto exact = planeFigures(many, 0.0, {});
   mean_truth = exact.figures.mean;
-  double square = 0.0, of_mean = 0.0, least = 0.0, count = 0.0;
+  double square = 0.0, of_mean = 0.0, least = 0.0, count = 0.0, beyond = 0.0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     PlaneRays rays(lit, grid, seed);
     while (rays.rounds() < PlaneRays::kLeastRounds) rays.addRounds();
     const auto found = planeFigures(rays, 0.0, {});
     for (std::size_t i = 0; i < grid.pointCount(); ++i) {
       if (!(found.error[i] > 0.0)) continue;
-      square += std::pow((found.light[i] - exact.light[i]) / found.error[i], 2.0);
+      const double off = (found.light[i] - exact.light[i]) / found.error[i];
+      square += off * off;
+      beyond += std::abs(off) > 2.131 ? 1.0 : 0.0;
       count += 1.0;
     }
     of_mean += std::pow((found.figures.mean - mean_truth) / found.figures.mean_error, 2.0) / kSeeds;
@@ -163,6 +165,7 @@ TEST_F(PlaneOverAChequeredFloor, StatedErrorsAreWhatPointsAreOffBy) {
   }
   EXPECT_GT(count, 0.9 * kSeeds * 25);
   EXPECT_NEAR(square / count, 1.154, 0.25);
+  EXPECT_NEAR(beyond / count, 0.05, 0.025) << "of Student's t with 15 degrees of freedom";
   EXPECT_GT(of_mean, 0.5);
   EXPECT_LT(of_mean, 2.2);
   const double darkest = *std::ranges::min_element(exact.light);

@@ -65,8 +65,9 @@ TEST_F(DaylightFactors, OfAnUprightPlaneIsTwoFifths) {
 // Ground of luminance G fills the lower quarter: half of what level ground of pi G would get.
 TEST_F(DaylightFactors, CountTheGroundOutside) {
   const double ground = 0.2 * 10'000.0 / kPi;
-  const auto black = factorAt({floor()}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0});
-  const auto grey = factorAt({}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0}, ground);
+  const test::Quad chip{{-0.5F, -0.4F, 0.5F}, {0.01F, 0.0F, 0.0F}, {0.0F, 0.0F, -0.01F}};
+  const auto black = factorAt({chip}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0});
+  const auto grey = factorAt({chip}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0}, ground);
   EXPECT_NEAR(grey.mean - black.mean, 10.0, 0.6);
 }
 
@@ -140,7 +141,7 @@ TEST_F(DaylightFactors, UnderARoofLightAreItsSkyComponent) {
   });
   const auto found = factorAt(room.quads(), at, up);
   EXPECT_NEAR(found.mean, expected, 4.0 * found.mean_error + 0.005 * expected);
-  EXPECT_LT(found.mean_error, 0.01 * expected);
+  EXPECT_LT(found.mean_error, 0.02 * expected);
 }
 
 TEST_F(DaylightFactors, BehindAWindowAreItsSkyComponent) {
