@@ -15,7 +15,7 @@ double squared(double x) { return x * x; }
 struct Estimates {
   double rounds = 0.0;
   std::vector<double> light, reflected;     ///< by point
-  std::vector<double> variance;             ///< of rays alone
+  std::vector<double> variance;             ///< of rays alone: withNeighbours()
   std::array<std::vector<double>, 2> half;  ///< light by even rounds alone, and by odd ones
   double solve = 0.0;                       ///< variance that the halves of the solve tell of
   double mean = 0.0, mean_variance = 0.0;   ///< all of it
@@ -29,6 +29,26 @@ double solveVariance(const PlaneRays& rays, double rounds) {
   for (const auto& point : rays.points())
     sum += squared(point.off / rounds) - varianceOfMean(point.off, point.off_squares, rounds);
   return std::max(0.0, sum / static_cast<double>(rays.points().size()));
+}
+
+/// Where light comes from a few directions that rays seldom find, the rounds of a single point scatter too little now and
+/// then: the mean variance of up to nine points around it stands for its own where that is smaller.
+std::vector<double> withNeighbours(const std::vector<double>& own, const PlaneGrid& grid) {
+  std::vector<double> larger;
+  larger.reserve(own.size());
+  for (std::uint32_t row = 0; row < grid.rows; ++row) {
+    for (std::uint32_t column = 0; column < grid.columns; ++column) {
+      double sum = 0.0, count = 0.0;
+      for (auto r = row - std::min(row, 1U); r < std::min(row + 2, grid.rows); ++r) {
+        for (auto c = column - std::min(column, 1U); c < std::min(column + 2, grid.columns); ++c) {
+          sum += own[std::size_t{r} * grid.columns + c];
+          count += 1.0;
+        }
+      }
+      larger.push_back(std::max(own[larger.size()], sum / count));
+    }
+  }
+  return larger;
 }
 
 Estimates estimatesOf(const PlaneRays& rays) {
@@ -47,6 +67,7 @@ Estimates estimatesOf(const PlaneRays& rays) {
     sum += mean;
     squares += squared(mean);
   }
+  of.variance = withNeighbours(of.variance, rays.grid());
   of.solve = solveVariance(rays, of.rounds);
   of.mean = sum / of.rounds;
   of.mean_variance = varianceOfMean(sum, squares, of.rounds) + of.solve;

@@ -51,6 +51,7 @@ class PlaneRays {
 
   [[nodiscard]] std::uint32_t rounds() const { return static_cast<std::uint32_t>(means_.size()); }
   [[nodiscard]] const std::vector<PointSums>& points() const { return points_; }
+  [[nodiscard]] const PlaneGrid& grid() const { return grid_; }
   /// Over the points, by round.
   [[nodiscard]] const std::vector<double>& means() const { return means_; }
 
