@@ -335,10 +335,10 @@ struct CameraCall {
   std::optional<CameraPose> pose = {};
 };
 
-using Call =
-    std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall, SceneHistoryCall,
-                 SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall, SolveWaitCall, SolveHistoryCall,
-                 SolveMeasureCall, StatusCall, SubscribeCall, CreditCall, SnapshotCall, TexelCall, ViewersCall, CameraCall>;
+using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall,
+                          SceneHistoryCall, SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall,
+                          SolveWaitCall, SolveHistoryCall, SolveMeasureCall, StatusCall, SubscribeCall, CreditCall,
+                          SnapshotCall, TexelCall, ViewersCall, CameraCall>;
 
 // ---- notifications from the server ----
 

@@ -48,9 +48,8 @@ void addFigures(json& to, const PlaneFigures& f, const char* light) {
 }
 
 json toJson(const Plane& plane) {
-  json out = {{"node", plane.node},     {"name", plane.name},   {"columns", plane.columns},
-              {"rows", plane.rows},     {"first", plane.first}, {"across", plane.across},
-              {"down", plane.down},     {"normal", plane.normal}};
+  json out = {{"node", plane.node},   {"name", plane.name},     {"columns", plane.columns}, {"rows", plane.rows},
+              {"first", plane.first}, {"across", plane.across}, {"down", plane.down},       {"normal", plane.normal}};
   addFigures(out, plane.illuminance, "lux");
   if (!plane.verdict.all.empty()) {
     auto &target = out["target"], &verdict = out["verdict"];
@@ -102,8 +101,8 @@ void read(Reader& r, Plane& plane) {
   r.text("name", plane.name, Need::kOptional, kAnyText);
   r.integer("columns", plane.columns, Need::kRequired, 1, kMaxPlanePoints);
   r.integer("rows", plane.rows, Need::kRequired, 1, kMaxPlanePoints);
-  for (const auto& [key, value] : {std::pair{"first", &plane.first}, {"across", &plane.across}, {"down", &plane.down},
-                                   {"normal", &plane.normal}})
+  for (const auto& [key, value] :
+       {std::pair{"first", &plane.first}, {"across", &plane.across}, {"down", &plane.down}, {"normal", &plane.normal}})
     readTriple(r, key, Need::kRequired, -kMost, kMost, *value);
   const auto count = static_cast<std::size_t>(plane.columns * plane.rows);
   readFigures(r, "lux", count, plane.illuminance);
@@ -119,9 +118,8 @@ void read(Reader& r, Plane& plane) {
     });
   }
   if (r.find("daylightFactor") != nullptr)
-    r.object("daylightFactor", Need::kOptional, [&](Reader& inner) {
-      readFigures(inner, "percent", count, plane.daylight_factor.emplace());
-    });
+    r.object("daylightFactor", Need::kOptional,
+             [&](Reader& inner) { readFigures(inner, "percent", count, plane.daylight_factor.emplace()); });
 }
 
 }  // namespace

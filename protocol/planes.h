@@ -11,7 +11,7 @@
 namespace radiosity::protocol {
 
 inline constexpr std::size_t kMaxPlanes = 64;
-inline constexpr std::size_t kMaxPlanePoints = 250'000;   ///< of all planes together
+inline constexpr std::size_t kMaxPlanePoints = 250'000;     ///< of all planes together
 inline constexpr std::size_t kMaxInlinePlanePoints = 4096;  ///< with more a message has no grids, only files do
 
 /// Lux, or percent for daylight factors. Errors are standard errors.

@@ -19,8 +19,8 @@ std::string number(const std::optional<double>& value) { return value ? fmt::for
 
 std::string figures(const PlaneFigures& f) {
   return fmt::format("{:.6g},{:.3g},{:.6g},{:.3g},{:.6g},{:.3g},{:.6g},{:.4g},{:.2g},{:.3g}", f.mean, f.mean_error,
-                     f.minimum, f.minimum_error, f.maximum, f.maximum_error, f.median, f.uniformity,
-                     f.uniformity_error, f.solve_error);
+                     f.minimum, f.minimum_error, f.maximum, f.maximum_error, f.median, f.uniformity, f.uniformity_error,
+                     f.solve_error);
 }
 
 std::string figureNames(const char* before) {
@@ -48,8 +48,8 @@ std::array<double, 3> Plane::pointAt(std::size_t point) const {
 
 std::string planesCsv(const Planes& planes) {
   const bool has_daylight = hasDaylight(planes);
-  std::string text = "plane,node,columns,rows" + figureNames("") +
-                     ",targetLux,targetUniformity,luxVerdict,uniformityVerdict,verdict";
+  std::string text =
+      "plane,node,columns,rows" + figureNames("") + ",targetLux,targetUniformity,luxVerdict,uniformityVerdict,verdict";
   if (has_daylight) text += figureNames("daylightFactor:");
   text += kEnd;
   for (const auto& plane : planes.planes) {

@@ -101,8 +101,7 @@ class Solve {
       if (!external) return tl::unexpected(external.error());
       by_path_ = *external;
     }
-    return checkOutputs(
-        {options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
+    return checkOutputs({options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
   }
 
   Result<void> findServer() {
@@ -470,10 +469,10 @@ void addSolve(CLI::App& app, Run& run) {
 void addMeasure(CLI::App& app, Run& run) {
   auto options = std::make_shared<SolveOptions>();
   auto& command = *app.add_subcommand(
-      "measure", "tell illuminance, uniformity and daylight factor on a scene's measuring planes (extras.radiosityPlane)");
+      "measure",
+      "tell illuminance, uniformity and daylight factor on a scene's measuring planes (extras.radiosityPlane)");
   command
-      .add_option("SCENE", options->scene,
-                  "the scene, which is solved for it (default: that of --server as it is now)")
+      .add_option("SCENE", options->scene, "the scene, which is solved for it (default: that of --server as it is now)")
       ->type_name("");
   addMeasureOptions(command, options->measure);
   addSolvingOptions(command, *options);

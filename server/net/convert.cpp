@@ -195,9 +195,8 @@ std::string verdictName(const std::optional<engine::PlaneVerdict>& verdict) {
 }
 
 protocol::PlaneFigures toFigures(const engine::PlaneFigures& f) {
-  protocol::PlaneFigures out{f.mean,          f.mean_error, f.minimum,    f.minimum_error,    f.maximum,
-                             f.maximum_error, f.median,     f.uniformity, f.uniformity_error, f.solve_error,
-                             f.light,         f.error};
+  protocol::PlaneFigures out{f.mean,   f.mean_error, f.minimum,          f.minimum_error, f.maximum, f.maximum_error,
+                             f.median, f.uniformity, f.uniformity_error, f.solve_error,   f.light,   f.error};
   for (auto* value : {&out.mean, &out.mean_error, &out.minimum, &out.minimum_error, &out.maximum, &out.maximum_error,
                       &out.median, &out.uniformity, &out.uniformity_error, &out.solve_error})
     *value = finite(*value, 0.0);

@@ -37,8 +37,12 @@ bool isAskedFor(const scene::MeasuringPlane& plane, const std::string& which) {
 }
 
 solver::PlaneGrid gridOf(const scene::MeasuringPlane& plane, const scene::PatchScene& patches) {
-  return {(plane.corner - patches.centre) / patches.scale, plane.across / patches.scale, plane.down / patches.scale,
-          plane.normal, plane.columns, plane.rows};
+  return {(plane.corner - patches.centre) / patches.scale,
+          plane.across / patches.scale,
+          plane.down / patches.scale,
+          plane.normal,
+          plane.columns,
+          plane.rows};
 }
 
 std::optional<PlaneVerdict> toVerdict(const std::optional<solver::Verdict>& verdict) {
@@ -50,9 +54,18 @@ std::optional<PlaneVerdict> toVerdict(const std::optional<solver::Verdict>& verd
 
 PlaneFigures toFigures(solver::PlaneResult result) {
   const auto& f = result.figures;
-  return {f.mean,          f.mean_error, f.minimum,    f.minimum_error,    f.maximum,
-          f.maximum_error, f.median,     f.uniformity, f.uniformity_error, f.solve_error,
-          std::move(result.light), std::move(result.error)};
+  return {f.mean,
+          f.mean_error,
+          f.minimum,
+          f.minimum_error,
+          f.maximum,
+          f.maximum_error,
+          f.median,
+          f.uniformity,
+          f.uniformity_error,
+          f.solve_error,
+          std::move(result.light),
+          std::move(result.error)};
 }
 
 solver::PlaneResult resultOf(const solver::PlaceLight& light, const scene::MeasuringPlane& plane,
@@ -82,8 +95,7 @@ void measureIlluminance(const PlaneParts& parts, std::vector<MeasuredPlane>& mea
       {*parts.patches, nullptr, nullptr, parts.materials, parts.sources, parts.irradiance, parts.difference});
   for (std::size_t p = 0; p < parts.planes.size(); ++p) {
     const auto& plane = parts.planes[p];
-    auto result =
-        resultOf(light, plane, parts, parts.systematic, {plane.target.lux, plane.target.uniformity}, 1.0);
+    auto result = resultOf(light, plane, parts, parts.systematic, {plane.target.lux, plane.target.uniformity}, 1.0);
     measured[p].lux_verdict = toVerdict(result.verdict.lux);
     measured[p].uniformity_verdict = toVerdict(result.verdict.uniformity);
     measured[p].verdict = toVerdict(result.verdict.all);
@@ -95,9 +107,8 @@ void measureDaylight(const PlaneParts& parts, std::vector<MeasuredPlane>& measur
   auto materials = parts.materials;
   materials.emission.fill(glm::vec3(0.0F));
   solver::LightSources sources;
-  sources.sky.picture = scene::SharedSkyPicture(std::make_shared<const scene::SkyPicture>(
-      scene::daylightImage(scene::cieShape(scene::kCieOvercast), {0.0, 1.0, 0.0}, kOutsideLux,
-                           kGround * kOutsideLux / std::numbers::pi)));
+  sources.sky.picture = scene::SharedSkyPicture(std::make_shared<const scene::SkyPicture>(scene::daylightImage(
+      scene::cieShape(scene::kCieOvercast), {0.0, 1.0, 0.0}, kOutsideLux, kGround * kOutsideLux / std::numbers::pi)));
   const std::vector<glm::vec3> dark(parts.patches->nodeCount(), glm::vec3(0.0F));
   solver::PlaceLight light({*parts.patches, nullptr, nullptr, materials, sources, dark});
   const auto solution = solver::solveUnderSky(light, *parts.patches, parts.seed);

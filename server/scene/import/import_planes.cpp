@@ -51,8 +51,9 @@ class PlaneReader {
     if (extensionOf(json_, "EXT_mesh_gpu_instancing") != nullptr)
       return bad(pointer_, "must not be on a node with EXT_mesh_gpu_instancing: a plane lies in one place");
     if (node_.animated)
-      return bad(pointer_, "must not be on a node that an animation moves, or below one: animations are not "
-                                    "played, and a plane lies in one place");
+      return bad(pointer_,
+                 "must not be on a node that an animation moves, or below one: animations are not "
+                 "played, and a plane lies in one place");
     MeasuringPlane made;
     made.node = static_cast<std::uint32_t>(node_.index);
     const auto* name = memberOf(json_, "name");
@@ -102,15 +103,13 @@ class PlaneReader {
     if (json == nullptr) return {};
     const auto pointer = pointer_ + "/target";
     const auto *lux = memberOf(*json, "lux"), *uniformity = memberOf(*json, "uniformity");
-    if (lux == nullptr && uniformity == nullptr)
-      return bad(pointer, "must be an object with lux, uniformity or both");
+    if (lux == nullptr && uniformity == nullptr) return bad(pointer, "must be an object with lux, uniformity or both");
     if (lux != nullptr) {
       if (!isIn(*lux, kMostLux)) return bad(pointer + "/lux", "must be a number above 0, at most 1e9");
       target.lux = lux->get<double>();
     }
     if (uniformity != nullptr) {
-      if (!isIn(*uniformity, 1.0))
-        return bad(pointer + "/uniformity", "must be a number above 0, at most 1");
+      if (!isIn(*uniformity, 1.0)) return bad(pointer + "/uniformity", "must be a number above 0, at most 1");
       target.uniformity = uniformity->get<double>();
     }
     return {};
@@ -137,8 +136,7 @@ class PlaneReader {
     const auto* json = memberOf(plane_, member);
     if (json == nullptr) return usual;
     if (json->is_number_integer() && *json >= 1 && *json <= kMostPlanePoints) return json->get<std::uint64_t>();
-    return bad(pointer_ + "/" + member,
-                        "must be a whole number from 1 to " + std::to_string(kMostPlanePoints));
+    return bad(pointer_ + "/" + member, "must be a whole number from 1 to " + std::to_string(kMostPlanePoints));
   }
 
   [[nodiscard]] tl::unexpected<Error> bad(const std::string& pointer, std::string what) const {
@@ -171,7 +169,6 @@ std::vector<bool> animatedNodes(const Json& gltf) {
   }
   return animated;
 }
-
 
 glm::dmat4 localMatrix(const Json& node) {
   const auto numbers = [&](const char* member, auto otherwise) {

@@ -11,8 +11,8 @@ namespace radiosity::scene {
 
 /// Of the nodes that the document shows and that are visible, in the order of the node tree; those of hidden nodes are
 /// checked alone. A plane lies in its node's x-z plane around the node's origin and looks along +y; columns go along x,
-/// rows along z. `document`: its nodes are checked, as import does. Errors name the member. O(nodes), little where there
-/// are no planes.
+/// rows along z. `document`: its nodes are checked, as import does. Errors name the member. O(nodes), little where
+/// there are no planes.
 [[nodiscard]] Result<std::vector<MeasuringPlane>> readPlanes(const Document& document);
 
 }  // namespace radiosity::scene

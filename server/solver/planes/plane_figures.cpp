@@ -31,8 +31,8 @@ double solveVariance(const PlaneRays& rays, double rounds) {
   return std::max(0.0, sum / static_cast<double>(rays.points().size()));
 }
 
-/// Where light comes from a few directions that rays seldom find, the rounds of a single point scatter too little now and
-/// then: the mean variance of up to nine points around it stands for its own where that is smaller.
+/// Where light comes from a few directions that rays seldom find, the rounds of a single point scatter too little now
+/// and then: the mean variance of up to nine points around it stands for its own where that is smaller.
 std::vector<double> withNeighbours(const std::vector<double>& own, const PlaneGrid& grid) {
   std::vector<double> larger;
   larger.reserve(own.size());
@@ -188,8 +188,8 @@ PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGo
   for (const double variance : of.variance) result.error.push_back(unit * std::sqrt(variance + of.solve));
   for (auto& light : result.light) light *= unit;
   auto& f = result.figures;
-  for (auto* value : {&f.mean, &f.mean_error, &f.minimum, &f.minimum_error, &f.maximum, &f.maximum_error, &f.median,
-                      &f.solve_error})
+  for (auto* value :
+       {&f.mean, &f.mean_error, &f.minimum, &f.minimum_error, &f.maximum, &f.maximum_error, &f.median, &f.solve_error})
     *value *= unit;
   return result;
 }

@@ -47,9 +47,9 @@ struct PlaneResult {
 /// Tests, one-sided, by Student's t with rounds - 1 degrees of freedom. The mean passes where its lower bound is not
 /// below what is asked, and fails where its upper bound is. U0 passes where each single point, by its own lower bound,
 /// is at least that part of the mean (an intersection-union test: Berger 1982, "Multiparameter hypothesis testing and
-/// acceptance sampling", so no correction for the number of points is due). It fails where the darkest point by one half
-/// of the rays is below it by the upper bound of the other half. Both bounds widen by what the solve may be off by.
-/// Where both are asked for each test of a failure is at 97.5 %.
+/// acceptance sampling", so no correction for the number of points is due). It fails where the darkest point by one
+/// half of the rays is below it by the upper bound of the other half. Both bounds widen by what the solve may be off
+/// by. Where both are asked for each test of a failure is at 97.5 %.
 [[nodiscard]] PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGoal& goal,
                                        double unit = 1.0);
 

@@ -11,7 +11,7 @@ import type { Notes } from '../ui/toast';
 export interface PlanesHost {
   fetch(path: string, init?: RequestInit): Promise<Response>;
   document: { gltf: Gltf; revision: number };
-  picture: { showPlanes(planes: Planes['planes'], gltf: Gltf): void };
+  picture: { showPlanes(planes: Planes['planes']): void };
   notes: Notes;
   add(): void;
   select(node: number): void;
@@ -59,7 +59,8 @@ export class PlanesSession {
     try {
       const response = await this.host.fetch(`/planes.json?daylightFactor=${this.daylight}`);
       this.measured = (await response.json()) as Planes;
-      this.host.picture.showPlanes(this.measured.planes, this.host.document.gltf);
+      // Where an edit came meanwhile the planes may lie elsewhere now: the panel says so.
+      if (this.measured.revision === this.host.document.revision) this.host.picture.showPlanes(this.measured.planes);
     } catch (error) {
       this.host.notes.show(`The planes were not measured: ${(error as Error).message}`, 'bad');
     }

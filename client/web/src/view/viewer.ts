@@ -74,7 +74,6 @@ export class Viewer {
   readonly brightness: Brightness;
   mode: ViewMode | undefined;
   private people: People | undefined;
-  private measured: { planes: readonly MeasuredPlane[]; document: Gltf } | undefined;
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
   private readonly programs: Programs;
@@ -243,16 +242,10 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
-  /** Shows the light on measuring planes; `document`: that they were measured in. */
-  showPlanes(planes: readonly MeasuredPlane[], document: Gltf): void {
-    this.measured = { planes, document: structuredClone(document) };
-    this.takePlanes();
-    this.shown?.applyDocument(document);
+  /** Shows the light on measuring planes, which were measured in the document as it is now. */
+  showPlanes(planes: readonly MeasuredPlane[]): void {
+    this.layouts.showPlanes(planes);
     this.moved();
-  }
-
-  private takePlanes(): void {
-    if (this.measured) this.shown?.planes.take(this.measured.planes, this.measured.document);
   }
 
   /** Draws where others look from into the picture. */
@@ -407,7 +400,6 @@ export class Viewer {
     }
     if (scene) {
       this.world.add(scene.root);
-      this.takePlanes();
       this.rig.setBounds(scene.bounds);
     }
     this.pagesView.show(this.mode?.flat ? scene?.set : undefined); // the old pages are gone

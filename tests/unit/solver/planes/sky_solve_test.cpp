@@ -136,9 +136,8 @@ TEST_F(DaylightFactors, UnderARoofLightAreItsSkyComponent) {
   room.addWhole(1, -0.5F);
   room.addWithOpening(1, 0.5F, {-0.2F, -0.1F}, {0.2F, 0.3F});  // z from -0.2 on, x from -0.1 on
   const glm::dvec3 at(0.1, -0.1, -0.2), up(0.0, 1.0, 0.0);
-  const auto expected = skyComponent(at, up, up, 0.16, [](double u, double v) {
-    return glm::dvec3(-0.1 + 0.4 * v, 0.5, -0.2 + 0.4 * u);
-  });
+  const auto expected = skyComponent(
+      at, up, up, 0.16, [](double u, double v) { return glm::dvec3(-0.1 + 0.4 * v, 0.5, -0.2 + 0.4 * u); });
   const auto found = factorAt(room.quads(), at, up);
   EXPECT_NEAR(found.mean, expected, 4.0 * found.mean_error + 0.005 * expected);
   EXPECT_LT(found.mean_error, 0.02 * expected);
