@@ -4,7 +4,7 @@ import type { Object3D } from 'three';
 import * as edits from '../document/edits';
 import { type Gltf, hangingNodes, isSameScene, nodeName } from '../document/gltf';
 import { handlesOf, lightOf } from '../document/lights';
-import { addPlane } from '../document/planes';
+import { addPlane, planeOf } from '../document/planes';
 import { setSkyPicture, setSkyTurn } from '../document/skies';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
 import type { Patch, ScenePatchedNote } from '../protocol/messages';
@@ -104,7 +104,8 @@ export class EditSession {
     this.host.picture.select(this.isPictureOld ? undefined : selection?.node);
     this.offerHandles();
     this.panel.setSelection(selection);
-    if (selection && this.host.frame.panelOpen) this.host.frame.showTab('Scene');
+    if (selection && this.host.frame.panelOpen)
+      this.host.frame.showTab(planeOf(this.document.gltf, selection.node) ? 'Measure' : 'Scene');
   }
 
   /** The document is of another scene than the picture, so the numbers of nodes mean different objects in the two. */
