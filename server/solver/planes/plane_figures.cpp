@@ -98,9 +98,10 @@ PlaneFigures figuresOf(const Estimates& of, double systematic) {
   figures.mean = of.mean;
   figures.mean_error = std::sqrt(of.mean_variance);
   const auto least = extremeOf(of, std::less<>()), greatest = extremeOf(of, std::greater<>());
-  figures.minimum = least.value;
+  // Noise may put either beyond the mean, where it cannot be.
+  figures.minimum = std::min(least.value, of.mean);
   figures.minimum_error = least.error;
-  figures.maximum = greatest.value;
+  figures.maximum = std::max(greatest.value, of.mean);
   figures.maximum_error = greatest.error;
   auto sorted = of.light;
   std::ranges::sort(sorted);
