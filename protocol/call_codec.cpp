@@ -82,6 +82,12 @@ json params(const SnapshotCall& c) {
   return out;
 }
 json params(const TexelCall& c) { return {{"page", c.page}, {"x", c.x}, {"y", c.y}}; }
+json params(const SolveMeasureCall& c) {
+  json out = json::object();
+  if (!c.plane.empty()) out["plane"] = c.plane;
+  if (c.daylight_factor) out["daylightFactor"] = true;
+  return out;
+}
 json params(const CameraCall& c) { return c.pose ? toJson(*c.pose) : json::object(); }
 template <typename C>
 json params(const C& /*no parameters*/) {
@@ -195,6 +201,10 @@ void read(Reader& r, TexelCall& c) {
   r.narrow("page", c.page, Need::kRequired, 0, kMost);
   r.narrow("x", c.x, Need::kRequired, 0, kMost);
   r.narrow("y", c.y, Need::kRequired, 0, kMost);
+}
+void read(Reader& r, SolveMeasureCall& c) {
+  r.text("plane", c.plane, Need::kOptional, kMaxTextBytes);
+  r.boolean("daylightFactor", c.daylight_factor, Need::kOptional);
 }
 void read(Reader& r, CameraCall& c) {
   if (r.find("position") != nullptr || r.find("target") != nullptr) read(r, c.pose.emplace());

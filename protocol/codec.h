@@ -34,6 +34,7 @@ namespace radiosity::protocol {
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SnapshotReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SolveHistoryReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const TexelReply& reply);
+[[nodiscard]] std::string encodeReply(const RequestId& id, const Planes& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const ViewersReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const CameraReply& reply);
 

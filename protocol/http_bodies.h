@@ -25,6 +25,9 @@ struct HttpError {
 [[nodiscard]] std::string encodeHttpLoad(const SceneLoadReply& reply);  ///< {"revision", "warnings"}
 [[nodiscard]] Result<SceneLoadReply> decodeHttpLoad(std::string_view body);
 
+[[nodiscard]] std::string encodeHttpPlanes(const Planes& planes);  ///< as the reply of solve.measure
+[[nodiscard]] Result<Planes> decodeHttpPlanes(std::string_view body);
+
 [[nodiscard]] std::string encodeHttpUrl(std::string_view url);  ///< {"url"}
 [[nodiscard]] Result<std::string> decodeHttpUrl(std::string_view body);
 

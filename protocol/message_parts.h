@@ -24,6 +24,8 @@ void read(Reader& reader, Settings& settings);
 /// Member "sky"; none where it is missing or null.
 void readSky(Reader& reader, std::optional<Sky>& sky);
 void read(Reader& reader, Progress& progress);
+[[nodiscard]] nlohmann::json toJson(const Planes& planes);
+void read(Reader& reader, Planes& planes);
 
 void readStrings(Reader& reader, const char* key, Need need, std::size_t max, std::vector<std::string>& out);
 /// An array of three numbers, each at least `low` and at most `high`.

@@ -15,6 +15,7 @@
 
 #include "common/method.h"
 #include "protocol/limits.h"
+#include "protocol/planes.h"
 #include "protocol/sky.h"
 
 namespace radiosity::protocol {
@@ -285,6 +286,13 @@ struct SolveHistoryCall {
   static constexpr std::string_view kMethod = "solve.history";
   using Reply = SolveHistoryReply;
 };
+/// Illuminance on the scene's measuring planes.
+struct SolveMeasureCall {
+  static constexpr std::string_view kMethod = "solve.measure";
+  using Reply = Planes;
+  std::string plane = {};        ///< name or index of its node; empty: all
+  bool daylight_factor = false;  ///< also under a CIE overcast sky, all lamps off
+};
 struct StatusCall {
   static constexpr std::string_view kMethod = "status";
   using Reply = StatusReply;
@@ -327,10 +335,10 @@ struct CameraCall {
   std::optional<CameraPose> pose = {};
 };
 
-using Call =
-    std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall, SceneHistoryCall,
-                 SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall, SolveWaitCall, SolveHistoryCall,
-                 StatusCall, SubscribeCall, CreditCall, SnapshotCall, TexelCall, ViewersCall, CameraCall>;
+using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall,
+                          SceneHistoryCall, SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall,
+                          SolveWaitCall, SolveHistoryCall, SolveMeasureCall, StatusCall, SubscribeCall, CreditCall,
+                          SnapshotCall, TexelCall, ViewersCall, CameraCall>;
 
 // ---- notifications from the server ----
 

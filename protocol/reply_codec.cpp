@@ -222,6 +222,8 @@ std::string encodeReply(const RequestId& id, const TexelReply& r) {
           {"revision", r.revision}, {"tileVersion", r.tile_version}, {"irradiance", r.irradiance}, {"error", r.error}});
 }
 
+std::string encodeReply(const RequestId& id, const Planes& r) { return answer(id, toJson(r)); }
+
 std::string encodeReply(const RequestId& id, const ViewersReply& r) { return answer(id, json{{"count", r.count}}); }
 
 std::string encodeReply(const RequestId& id, const CameraReply& r) {
@@ -251,6 +253,7 @@ template Result<SubscribeReply> decodeReply<SubscribeReply>(const json&);
 template Result<CreditReply> decodeReply<CreditReply>(const json&);
 template Result<SnapshotReply> decodeReply<SnapshotReply>(const json&);
 template Result<TexelReply> decodeReply<TexelReply>(const json&);
+template Result<Planes> decodeReply<Planes>(const json&);
 template Result<ViewersReply> decodeReply<ViewersReply>(const json&);
 template Result<CameraReply> decodeReply<CameraReply>(const json&);
 

@@ -23,6 +23,7 @@ void buildApp(CLI::App& app, Run& run) {
   addScript(app, run);
   addStatus(app, run);
   addTexel(app, run);
+  addMeasure(app, run);
   addSnapshot(app, run);
   addSave(app, run);
 }

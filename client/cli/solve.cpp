@@ -1,4 +1,5 @@
-// radiosity solve: scene in, lightmaps out, on a private server or on one that runs already.
+// radiosity solve and measure: scene in, lightmaps or figures of measuring planes out, on a private server or on one
+// that runs already.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/measure.h"
 #include "client/cli/remote.h"
 #include "client/cli/report.h"
 #include "client/cli/scene_file.h"
@@ -30,7 +32,8 @@ constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps st
 constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png;
+  std::string scene, output, report, png;  ///< output: empty where nothing but planes is asked for
+  MeasureOptions measure;
   SkyOptions sky;
   std::string state;  ///< folder; empty: an interrupted solve is lost
   RemoteOptions server;
@@ -91,13 +94,14 @@ class Solve {
     sky_ = std::move(*sky);
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
-    if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
+    if (!options_.output.empty())
+      if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
       by_path_ = *external;
     }
-    return checkOutputs({options_.output, options_.report, options_.png});
+    return checkOutputs({options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
   }
 
   Result<void> findServer() {
@@ -255,13 +259,10 @@ class Solve {
         (chooses ? error.total : error.texels) <= options_.error && (!chooses || status.progress.state == "converged");
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings", percentText(error.total)));
-    auto written = saveScene(remote_,
-                             {.glb_path = options_.output,
-                              .unlit = options_.unlit,
-                              .png_path = options_.png,
-                              .error_map = options_.error_map},
-                             display_);
+    auto written = save();
     if (!written) return complainOf(CallFailure{written.error()});
+    auto measured = options_.measure.wanted ? measurePlanes(remote_, options_.measure, display_) : std::string();
+    if (!measured) return complainOf(CallFailure{measured.error()});
     addSurfaceError(connection, status);
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
@@ -272,12 +273,23 @@ class Solve {
     for (const auto& warning : status.warnings)
       if (passed_on_.find(warning) == std::string::npos) warn(warning);
     for (const auto& name : *written) std::printf("%s\n", name.c_str());
+    std::fputs(measured->c_str(), stdout);
     const auto& failure = status.progress.failure;
     const std::string why =
         status.progress.state == "limited" ? "limited (" + oneLine(failure) + "): " : "time limit: ";
     std::fprintf(stderr, "%s%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str(),
                  surfaceText(status.progress.error).c_str());
     return reached ? ExitCode::kOk : ExitCode::kShort;
+  }
+
+  Result<std::vector<std::string>> save() {
+    if (options_.output.empty()) return std::vector<std::string>();
+    return saveScene(remote_,
+                     {.glb_path = options_.output,
+                      .unlit = options_.unlit,
+                      .png_path = options_.png,
+                      .error_map = options_.error_map},
+                     display_);
   }
 
   Result<void> writeReport(const protocol::StatusReply& status, bool reached) const {
@@ -321,6 +333,8 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
   command.add_option("SCENE", options.scene, "the scene: .glb, or .gltf with its files beside it")
       ->required()
       ->type_name("");
+  command.add_option("--measure", options.measure.csv, "also the points of the scene's measuring planes, as CSV")
+      ->type_name("FILE");
   command
       .add_option("-o,--output", options.output,
                   "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
@@ -334,12 +348,10 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
   command.add_option("--report", options.report, "also figures about the solve, as JSON")->type_name("FILE");
 }
 
-}  // namespace
-
-void addSolve(CLI::App& app, Run& run) {
-  auto options = std::make_shared<SolveOptions>();
-  auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
-  addOutputOptions(command, *options);
+/// How to solve, and where.
+void addSolvingOptions(CLI::App& app, SolveOptions& of) {
+  auto& command = app;
+  auto* options = &of;
   command
       .add_option(
           "--error", options->error,
@@ -422,7 +434,49 @@ void addSolve(CLI::App& app, Run& run) {
       ->excludes(state);
   addAccessOptions(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
-  command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });
+}
+
+ExitCode solve(SolveOptions options) {
+  options.measure.wanted = !options.measure.csv.empty();
+  return Solve(options).run();
+}
+
+/// Of a scene that is solved for it, or else of a server's as it is now.
+ExitCode measure(SolveOptions options) {
+  options.measure.wanted = true;
+  if (!options.scene.empty()) return Solve(options).run();
+  if (options.server.url.empty()) return complain(Error{ErrorCode::kBadUsage, "name a SCENE, or a --server", {}});
+  const auto remote = remoteFrom(options.server);
+  if (!remote) return complain(remote.error());
+  if (auto ready = checkOutputs({options.measure.csv, options.measure.json}); !ready) return complain(ready.error());
+  ProgressDisplay display(options.quiet);
+  const auto measured = measurePlanes(*remote, options.measure, display);
+  if (!measured) return complain(measured.error());
+  std::fputs(measured->c_str(), stdout);
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void addSolve(CLI::App& app, Run& run) {
+  auto options = std::make_shared<SolveOptions>();
+  auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
+  addOutputOptions(command, *options);
+  addSolvingOptions(command, *options);
+  command.callback([options, &run] { run = [options] { return solve(*options); }; });
+}
+
+void addMeasure(CLI::App& app, Run& run) {
+  auto options = std::make_shared<SolveOptions>();
+  auto& command = *app.add_subcommand(
+      "measure",
+      "tell illuminance, uniformity and daylight factor on a scene's measuring planes (extras.radiosityPlane)");
+  command
+      .add_option("SCENE", options->scene, "the scene, which is solved for it (default: that of --server as it is now)")
+      ->type_name("");
+  addMeasureOptions(command, options->measure);
+  addSolvingOptions(command, *options);
+  command.callback([options, &run] { run = [options] { return measure(*options); }; });
 }
 
 }  // namespace radiosity::cli

@@ -3,6 +3,7 @@
 // to its own strand.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -291,6 +292,44 @@ struct Texel {
   glm::vec3 irradiance{0.0F}, error{0.0F};  ///< Quantity::kIrradiance, kError; lux
 };
 
+struct MeasureRequest {
+  std::string plane;             ///< name of its node, or that one's index; empty: all
+  bool daylight_factor = false;  ///< also under a CIE overcast sky, all lamps off
+};
+
+/// Of the points of a plane: lux, or percent for daylight factors. Errors are standard errors.
+struct PlaneFigures {
+  double mean = 0.0, mean_error = 0.0;
+  double minimum = 0.0, minimum_error = 0.0, maximum = 0.0, maximum_error = 0.0;  ///< not biased by noise
+  double median = 0.0;
+  double uniformity = 0.0, uniformity_error = 0.0;  ///< minimum / mean
+  double solve_error = 0.0;  ///< what the mean may be off by beyond that, since the solve has not ended, or by texels
+  std::vector<double> light, error;  ///< by point, row by row
+};
+
+/// Whether a plane reaches what is asked of it, at a confidence of 95 %.
+enum class PlaneVerdict { kPasses, kFails, kUndecided };
+
+struct MeasuredPlane {
+  std::uint32_t node = 0;
+  std::string name;
+  std::uint32_t columns = 0, rows = 0;
+  std::array<glm::dvec3, 3> place{};  ///< first point, steps to the next column and to the next row; metres
+  glm::dvec3 normal{0.0};
+  std::optional<double> wanted_lux, wanted_uniformity;
+  std::optional<PlaneVerdict> lux_verdict, uniformity_verdict, verdict;  ///< verdict: of both
+  PlaneFigures illuminance;
+  std::optional<PlaneFigures> daylight_factor;  ///< percent
+};
+
+/// The measuring planes of a moment.
+struct MeasureReport {
+  std::uint64_t revision = 0;
+  SolveState state = SolveState::kEmpty;
+  double error = 1.0;  ///< ErrorEstimate::total
+  std::vector<MeasuredPlane> planes;
+};
+
 /// Something mended itself that those who watch may wonder about.
 struct Notice {
   enum class Kind { kRendererReplaced, kSolveRestarted };
@@ -379,6 +418,12 @@ class Engine {
   /// asked often, by many: what it takes is made for all of them together, and seldom while the solve goes on; of a
   /// layout that has just come kBusy instead.
   virtual void texel(TexelRequest request, Callback<Texel> done) = 0;
+
+  /// Illuminance on the scene's measuring planes, as pictures are made. kNotFound: there is no plane of that name, and
+  /// Error::where is "plane".
+  virtual void measure(MeasureRequest /*request*/, Client /*client*/, Callback<MeasureReport> done) {
+    done(MeasureReport{});
+  }
 
   /// The same from the engine's start to its end.
   [[nodiscard]] virtual const Past& past() const {

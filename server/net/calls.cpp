@@ -310,6 +310,16 @@ void Calls::run(const protocol::SolveHistoryCall& /*call*/, const Slot& slot) {
   slot.reply(toSolveHistoryReply(hub_.engine().solveHistory()));
 }
 
+void Calls::run(const protocol::SolveMeasureCall& call, const Slot& slot) {
+  hub_.engine().measure({call.plane, call.daylight_factor}, client_,
+                        hub_.fromEngine<engine::MeasureReport>([slot](const Result<engine::MeasureReport>& report) {
+                          if (report) return slot.reply(withoutLongGrids(toPlanes(*report)));
+                          auto error = protocol::toRpcError(report.error());
+                          if (!error.pointer.empty()) error.pointer = "/params/" + error.pointer;
+                          slot.error(error);
+                        }));
+}
+
 void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {
   slot.reply(toStatusReply(hub_.engine().status()));
 }

@@ -70,6 +70,7 @@ class Calls {
   void run(const protocol::SolveRestartCall& call, const Slot& slot);
   void run(const protocol::SolveWaitCall& call, const Slot& slot);
   void run(const protocol::SolveHistoryCall& call, const Slot& slot);
+  void run(const protocol::SolveMeasureCall& call, const Slot& slot);
   void run(const protocol::StatusCall& call, const Slot& slot);
   void run(const protocol::SubscribeCall& call, const Slot& slot);
   void run(const protocol::CreditCall& call, const Slot& slot);

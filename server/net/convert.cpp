@@ -183,6 +183,65 @@ protocol::TexelReply toTexelReply(const engine::Texel& texel) {
   return reply;
 }
 
+namespace {
+
+std::array<double, 3> triple(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
+
+std::string verdictName(const std::optional<engine::PlaneVerdict>& verdict) {
+  if (!verdict) return {};
+  return *verdict == engine::PlaneVerdict::kPasses  ? "passes"
+         : *verdict == engine::PlaneVerdict::kFails ? "fails"
+                                                    : "undecided";
+}
+
+protocol::PlaneFigures toFigures(const engine::PlaneFigures& f) {
+  protocol::PlaneFigures out{f.mean,   f.mean_error, f.minimum,          f.minimum_error, f.maximum, f.maximum_error,
+                             f.median, f.uniformity, f.uniformity_error, f.solve_error,   f.light,   f.error};
+  for (auto* value : {&out.mean, &out.mean_error, &out.minimum, &out.minimum_error, &out.maximum, &out.maximum_error,
+                      &out.median, &out.uniformity, &out.uniformity_error, &out.solve_error})
+    *value = finite(*value, 0.0);
+  for (auto* list : {&out.light, &out.error})
+    for (auto& value : *list) value = finite(value, 0.0);
+  return out;
+}
+
+}  // namespace
+
+protocol::Planes toPlanes(const engine::MeasureReport& report) {
+  protocol::Planes out{report.revision, std::string(stateName(report.state)), finite(report.error, 1e9), {}};
+  for (const auto& plane : report.planes) {
+    auto& to = out.planes.emplace_back();
+    to.node = plane.node;
+    to.name = plane.name;
+    to.columns = plane.columns;
+    to.rows = plane.rows;
+    to.first = triple(plane.place[0]);
+    to.across = triple(plane.place[1]);
+    to.down = triple(plane.place[2]);
+    to.normal = triple(plane.normal);
+    to.wanted_lux = plane.wanted_lux;
+    to.wanted_uniformity = plane.wanted_uniformity;
+    to.verdict = {verdictName(plane.lux_verdict), verdictName(plane.uniformity_verdict), verdictName(plane.verdict)};
+    to.illuminance = toFigures(plane.illuminance);
+    if (plane.daylight_factor) to.daylight_factor = toFigures(*plane.daylight_factor);
+  }
+  return out;
+}
+
+protocol::Planes withoutLongGrids(protocol::Planes planes) {
+  std::size_t points = 0;
+  for (const auto& plane : planes.planes) points += plane.illuminance.light.size();
+  if (points <= protocol::kMaxInlinePlanePoints) return planes;
+  for (auto& plane : planes.planes) {
+    for (auto* figures : {&plane.illuminance, plane.daylight_factor ? &*plane.daylight_factor : nullptr}) {
+      if (figures == nullptr) continue;
+      figures->light.clear();
+      figures->error.clear();
+    }
+  }
+  return planes;
+}
+
 protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);

@@ -16,6 +16,9 @@ namespace radiosity::net {
 [[nodiscard]] protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, std::uint64_t limit);
 [[nodiscard]] protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& history);
 [[nodiscard]] protocol::TexelReply toTexelReply(const engine::Texel& texel);
+[[nodiscard]] protocol::Planes toPlanes(const engine::MeasureReport& report);
+/// What a message has room for.
+[[nodiscard]] protocol::Planes withoutLongGrids(protocol::Planes planes);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
 /// `current` with what the call names replaced.

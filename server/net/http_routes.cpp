@@ -190,6 +190,39 @@ void getStoredSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, co
   done(file(blob->bytes, "image/png"));
 }
 
+Result<engine::MeasureRequest> queryMeasure(const HttpRequest& request) {
+  const auto daylight = queryText(request, "daylightFactor", "false");
+  if (daylight != "true" && daylight != "false")
+    return fail(ErrorCode::kBadInput, "must be true or false", "?daylightFactor=");
+  return engine::MeasureRequest{queryText(request, "plane", ""), daylight == "true"};
+}
+
+/// `write` makes the body of what was measured.
+void measure(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done, std::string_view type,
+             std::string (*write)(const protocol::Planes&)) {
+  auto wanted = queryMeasure(request);
+  if (!wanted) return done(errorResponse(wanted.error()));
+  hub->engine().measure(
+      std::move(*wanted), clientOf(request),
+      hub->fromEngine<engine::MeasureReport>([done, type, write](Result<engine::MeasureReport> report) {
+        if (report) {
+          const auto text = write(toPlanes(*report));
+          return done(file(std::make_shared<const Bytes>(text.begin(), text.end()), type));
+        }
+        auto error = report.error();
+        if (error.where == "plane") error.where = "?plane=";
+        done(errorResponse(error));
+      }));
+}
+
+void getPlanesJson(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  measure(hub, request, done, "application/json", &protocol::encodeHttpPlanes);
+}
+
+void getPlanesCsv(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  measure(hub, request, done, "text/csv; charset=utf-8", &protocol::planesCsv);
+}
+
 void getHealth(const std::shared_ptr<Hub>& /*hub*/, HttpRequest& /*request*/, const Respond& done) {
   done(plain(200, "ok\n"));
 }
@@ -228,14 +261,24 @@ struct Route {
 
 constexpr std::array kRoutes = {
     Route{"/", "GET", getViewer, true},  // the viewer holds no secrets, and asks for the token itself
-    Route{"/assets/", "GET", getViewer, true},  Route{"/favicon.svg", "GET", getViewer, true},
-    Route{"/status", "GET", getStatus},         Route{"/scene", "PUT", putScene},
-    Route{"/uploads", "PUT", putUpload},        Route{"/scene.gltf", "GET", getSceneGltf},
-    Route{"/scene.glb", "GET", getSceneGlb},    Route{"/scene-unlit.glb", "GET", getUnlitGlb},
-    Route{"/sky.hdr", "GET", getSky},           Route{"/lightmaps/", "GET", getLightmap},
-    Route{"/snapshot.png", "GET", getSnapshot}, Route{"/snapshots/", "GET", getStoredSnapshot},
-    Route{"/healthz", "GET", getHealth, true},  Route{"/readyz", "GET", getReady, true},
-    Route{"/metrics", "GET", getMetrics},       Route{protocol::kWebSocketPath, "GET", nullptr},
+    Route{"/assets/", "GET", getViewer, true},
+    Route{"/favicon.svg", "GET", getViewer, true},
+    Route{"/status", "GET", getStatus},
+    Route{"/scene", "PUT", putScene},
+    Route{"/uploads", "PUT", putUpload},
+    Route{"/scene.gltf", "GET", getSceneGltf},
+    Route{"/scene.glb", "GET", getSceneGlb},
+    Route{"/scene-unlit.glb", "GET", getUnlitGlb},
+    Route{"/sky.hdr", "GET", getSky},
+    Route{"/lightmaps/", "GET", getLightmap},
+    Route{"/snapshot.png", "GET", getSnapshot},
+    Route{"/snapshots/", "GET", getStoredSnapshot},
+    Route{"/planes.json", "GET", getPlanesJson},
+    Route{"/planes.csv", "GET", getPlanesCsv},
+    Route{"/healthz", "GET", getHealth, true},
+    Route{"/readyz", "GET", getReady, true},
+    Route{"/metrics", "GET", getMetrics},
+    Route{protocol::kWebSocketPath, "GET", nullptr},
 };
 
 const Route* routeOf(const HttpRequest& request) {

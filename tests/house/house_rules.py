@@ -59,6 +59,7 @@ OWN_INCLUDES = [
         "reflected": "edits math patches rays",
         "variation": "edits lamps math patches rays reflected",
         "surface": "lamps math patches rays",
+        "planes": "math patches rays surface",
     }, SOLVER),
     *among("solver", {
         "shooting": "error math patches transport",

@@ -420,6 +420,32 @@ void FakeEngine::texel(engine::TexelRequest request, Callback<engine::Texel> don
   });
 }
 
+/// A desk of 3 x 2 points with 100, 101 ... lux, and, where asked for as "long", one of more than a message holds.
+void FakeEngine::measure(engine::MeasureRequest request, engine::Client /*client*/,
+                         Callback<engine::MeasureReport> done) {
+  const auto now = status();
+  answer([done, request, now] {
+    if (request.plane != "" && request.plane != "desk" && request.plane != "long")
+      return done(fail(ErrorCode::kNotFound, "there is no such plane", "plane"));
+    engine::MeasuredPlane plane;
+    plane.node = 4;
+    plane.name = request.plane == "long" ? "long" : "desk";
+    plane.columns = 3;
+    plane.rows = request.plane == "long" ? 2000 : 2;
+    plane.place = {glm::dvec3(1, 2, 3), glm::dvec3(0.5, 0, 0), glm::dvec3(0, 0, 0.25)};
+    plane.normal = {0, 1, 0};
+    for (std::uint32_t i = 0; i < plane.columns * plane.rows; ++i) {
+      plane.illuminance.light.push_back(100.0 + i);
+      plane.illuminance.error.push_back(0.5);
+    }
+    plane.illuminance.mean = 102.5;
+    plane.wanted_lux = 90.0;
+    plane.lux_verdict = plane.verdict = engine::PlaneVerdict::kPasses;
+    if (request.daylight_factor) plane.daylight_factor = plane.illuminance;
+    done(engine::MeasureReport{now.revision, now.state, 0.01, {plane}});
+  });
+}
+
 void FakeEngine::addListener(std::weak_ptr<engine::Listener> listener) {
   const std::lock_guard lock(mutex_);
   listeners_.push_back(std::move(listener));

@@ -125,6 +125,7 @@ class LitScene {
   [[nodiscard]] const std::shared_ptr<const scene::Scene>& sharedScene() const { return scene_; }
   [[nodiscard]] const std::shared_ptr<const scene::PatchScene>& sharedPatches() const { return patches_; }
   [[nodiscard]] const scene::PatchMaterials& materials() const { return materials_; }
+  [[nodiscard]] const solver::LightSources& sources() const { return sources_; }
   [[nodiscard]] solver::Solver& solver() { return *solver_; }
   [[nodiscard]] const solver::Solver& solver() const { return *solver_; }
   [[nodiscard]] const SolveSettings& settings() const { return settings_; }

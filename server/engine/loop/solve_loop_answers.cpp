@@ -9,6 +9,7 @@
 #include "server/engine/publish/exports.h"
 #include "server/engine/publish/framing.h"
 #include "server/engine/publish/picture.h"
+#include "server/engine/publish/plane_report.h"
 #include "server/engine/publish/quantity_pages.h"
 #include "server/engine/publish/sky_file.h"
 #include "server/scene/lightmap/lightmap.h"
@@ -134,6 +135,21 @@ void SolveLoop::snapshot(SnapshotRequest request, Client client, Callback<Snapsh
     auto parts = fromSolveThread([this, request] { return readPicture(*lit_, request); });
     if (!parts) return tl::unexpected<Error>(parts.error());
     return makePicture(view_, std::move(*parts), request);
+  });
+}
+
+void SolveLoop::measure(MeasureRequest request, Client client, Callback<MeasureReport> done) {
+  askLong<MeasureReport>(client, std::move(done), [this, request = std::move(request)]() -> Result<MeasureReport> {
+    MeasureReport report;
+    const auto parts = fromSolveThread([this, request, &report]() -> Result<PlaneParts> {
+      report.revision = revision_;
+      report.state = state_;
+      report.error = lit_->shownError();
+      return readPlanes(*lit_, request);
+    });
+    if (!parts) return tl::unexpected<Error>(parts.error());
+    report.planes = measurePlanes(*parts, request);
+    return report;
   });
 }
 

@@ -81,6 +81,7 @@ class SolveLoop final : public Engine {
   void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) override;
   void texel(TexelRequest request, Callback<Texel> done) override;
+  void measure(MeasureRequest request, Client client, Callback<MeasureReport> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
   [[nodiscard]] const Past& past() const override { return past_; }
   void callOff() override;

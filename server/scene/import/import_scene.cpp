@@ -11,6 +11,7 @@
 #include "server/scene/import/import_material.h"
 #include "server/scene/import/import_model.h"
 #include "server/scene/import/import_nodes.h"
+#include "server/scene/import/import_planes.h"
 #include "server/scene/import/import_record.h"
 #include "server/scene/import/scene_memory.h"
 
@@ -37,6 +38,7 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
   ImportContext context{document,      limits, *record.model, record.materials, before,
                         record.images, scene,  record.webs,   record.skies};
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
+  if (const auto planes = readPlanes(document); !planes) return tl::unexpected(planes.error());
   const auto all = claimOfGeometry(document, *record.model, *claimed, limits);
   if (!all) return tl::unexpected(all.error());
   record.claimed_bytes = context.claimed_bytes = *all;

@@ -59,7 +59,20 @@ PlaceLight::PlaceLight(const SolvedScene& solved)
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       emission_.push_back(side.gathered ? glm::vec3(0.0F) : emission[leaf]);
       reflectance_.push_back(reflectance[leaf]);
-      radiosity_.push_back(emission_.back() + reflectance_.back() * solved.irradiance[side.first_node + leaf]);
+    }
+  }
+  setIrradiance(solved.irradiance, solved.difference);
+}
+
+void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<const glm::vec3> difference) {
+  radiosity_ = emission_;
+  off_.assign(difference.empty() ? 0 : emission_.size(), glm::vec3(0.0F));
+  for (const auto& side : *sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto value = side.first_value + leaf;
+      radiosity_[value] += reflectance_[value] * irradiance[side.first_node + leaf];
+      // Of the mean of two, half of what they differ by.
+      if (!off_.empty()) off_[value] = 0.5F * reflectance_[value] * difference[side.first_node + leaf];
     }
   }
 }
@@ -79,20 +92,25 @@ PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) co
 }
 
 glm::dvec3 PlaceLight::arriving(const Spot& spot, std::uint64_t key) const {
-  return direct(spot, mixKeys(key, 1)) + reflected(spot, mixKeys(key, 2));
+  return direct(spot, mixKeys(key, 1), Looks::kFewer) + reflected(spot, mixKeys(key, 2), kRays).light;
+}
+
+PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, std::uint32_t rays) const {
+  const auto gathered = reflected(spot, mixKeys(key, 2), rays);
+  return {direct(spot, mixKeys(key, 1), Looks::kAll), gathered.light, gathered.off};
 }
 
 /// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
-glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key) const {
+PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const {
   const Sobol4 draws(key);
   RayOrder order;
-  for (std::uint32_t k = 0; k < kRays; ++k) order.add(k, draws(k));
+  for (std::uint32_t k = 0; k < rays; ++k) order.add(k, draws(k));
   order.sort();
   std::array<LeafRays::Place, geometry::kPacket> from;
   from.fill(spot.place);
   std::array<glm::dvec3, geometry::kPacket> direction;
   std::array<geometry::Hit, geometry::kPacket> hit;
-  glm::dvec3 sum(0.0);
+  Gathered sum;
   for (std::size_t first = 0; first < order.size(); first += geometry::kPacket) {
     const auto together = std::min<std::size_t>(geometry::kPacket, order.size() - first);
     for (std::size_t i = 0; i < together; ++i)
@@ -106,10 +124,11 @@ glm::dvec3 PlaceLight::reflected(const Spot& spot, std::uint64_t key) const {
       const auto of_ray = mixKeys(key, order[first + i].number);
       LeafRays::Place end;
       const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
-      sum += weight * leaving(value, end, of_ray, kMostSteps);
+      sum.light += weight * leaving(value, end, of_ray, kMostSteps);
+      if (!off_.empty() && value < off_.size()) sum.off += weight * glm::dvec3(off_[value]);
     }
   }
-  return sum / static_cast<double>(kRays);
+  return {sum.light / static_cast<double>(rays), sum.off / static_cast<double>(rays)};
 }
 
 /// By one ray.
@@ -127,14 +146,14 @@ glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, 
   if (value == LeafRays::kNothing) return glm::dvec3(0.0);
   if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
-  const auto arrives = direct(there, mixKeys(key, 3)) + reflectedBy(there, mixKeys(key, 4), steps - 1);
+  const auto arrives = direct(there, mixKeys(key, 3), Looks::kFewer) + reflectedBy(there, mixKeys(key, 4), steps - 1);
   return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;
 }
 
-glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key) const {
+glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key, Looks looks) const {
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < lamps_.size(); ++i)
-    sum += fromLamp(lamps_[i], spot, mixKeys(key, i)) * glm::dvec3(lamps_[i].emission);
+    sum += fromLamp(lamps_[i], spot, mixKeys(key, i), looks) * glm::dvec3(lamps_[i].emission);
   if (many_) sum += fromSomeLamps(spot, key);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const auto& place = spot.place;
@@ -176,13 +195,14 @@ double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint6
 }
 
 /// For an emission of one: the exact form factor of all of it, times the part of that which is seen.
-double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const {
+double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const {
   const auto& place = spot.place;
   if (unhiddenLight(lamp, place) <= 0.0) return 0.0;
   const std::span corners(lamp.corners.data(), lamp.corner_count);
   const auto factors = formFactorsAboveBoth(place.position, place.normal, spot.shading, corners);
   if (factors.shading <= 0.0) return 0.0;
   std::array<double, 2> weights{};
+  if (looks == Looks::kAll) return factors.shading * seenPart(lamp, spot, key, 0, kAllLooks, weights);
   const double first = seenPart(lamp, spot, key, 0, kFirstLooks, weights);
   const bool agree = first <= 0.0 || first >= 1.0;
   if (agree && uniformFromKey(key) >= kAskAgain) return factors.shading * first;

@@ -30,6 +30,8 @@ struct SolvedScene {
   const scene::PatchMaterials& materials;
   const LightSources& sources;
   std::span<const glm::vec3> irradiance;  ///< lux, by node of level 0
+  /// What two independent halves of the solve differ by, likewise; empty: not known. Need not outlive it either.
+  std::span<const glm::vec3> difference = {};
 };
 
 class PlaceLight {
@@ -50,21 +52,44 @@ class PlaceLight {
   };
   /// At (u, v) in [0, 1)^2 of a leaf that has area, evenly.
   [[nodiscard]] Spot spotOn(std::uint32_t value, const glm::vec2& at) const;
+  /// Of a place that need lie on no surface.
+  [[nodiscard]] static Spot spotAt(const glm::dvec3& position, const glm::dvec3& normal) {
+    return {{position, normal}, normal, {}};
+  }
   /// Irradiance, lux. The same key gives the same bits. Cost: kRays rays, and of each lamp some tens more where it is
   /// seen in part; of more than kEachLamp of them 64 in all.
   [[nodiscard]] glm::dvec3 arriving(const Spot& spot, std::uint64_t key) const;
+
+  /// The same by so many rays, in parts, and by kMostLooks looks at every lamp, so that several tell the variance even
+  /// at the edges of shadows. `off` is what the reflected part of a solve with the halves of
+  /// SolvedScene::difference is off by, one standard deviation of either sign; 0 where that is not known.
+  struct Arriving {
+    glm::dvec3 direct{0.0}, reflected{0.0}, off{0.0};
+  };
+  [[nodiscard]] Arriving arriving(const Spot& spot, std::uint64_t key, std::uint32_t rays) const;
+  /// Other irradiance and difference of the same scene, by node of level 0.
+  void setIrradiance(std::span<const glm::vec3> irradiance, std::span<const glm::vec3> difference);
+  /// Of the sky, lm/m^2: pi times the radiance in the middle of a cell.
+  [[nodiscard]] glm::dvec3 skyAt(std::uint32_t cell) const { return sky_->at(cell); }
+  /// By leaf value.
+  [[nodiscard]] const std::vector<glm::vec3>& reflectance() const { return reflectance_; }
 
   [[nodiscard]] const std::vector<Side>& sides() const { return *sides_; }
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
 
  private:
-  [[nodiscard]] glm::dvec3 reflected(const Spot& spot, std::uint64_t key) const;
+  struct Gathered {
+    glm::dvec3 light{0.0}, off{0.0};
+  };
+  [[nodiscard]] Gathered reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const;
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
-  [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key) const;
+  /// How many points of a lamp look: all, or fewer where the first agree.
+  enum class Looks { kAll, kFewer };
+  [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] double fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
-  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] glm::dvec3 fromSomeLamps(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] double seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
                                 std::uint32_t end, std::array<double, 2>& weights) const;
@@ -83,6 +108,7 @@ class PlaceLight {
   std::optional<SkyLight> sky_;
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
+  std::vector<glm::vec3> off_;  ///< what radiosity_ is off by; empty: not known
 };
 
 }  // namespace radiosity::solver

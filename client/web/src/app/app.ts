@@ -5,6 +5,7 @@ import { EditHistory } from '../editing/edit_history';
 import { EditSession } from '../editing/edit_session';
 import { LightMeter } from '../looking/light_meter';
 import { PeopleSession } from '../looking/people_session';
+import { PlanesSession } from '../looking/planes_session';
 import { ViewSession, type Placed } from '../looking/view_session';
 import type { Connection, LinkState } from '../protocol/connection';
 import type { Bookmark, HelloReply, LightmapsNote, Notifications, Progress, ServerInfo } from '../protocol/messages';
@@ -43,6 +44,7 @@ export class App {
   private readonly sky: SkyFetch;
   readonly edit: EditSession;
   readonly people: PeopleSession;
+  readonly planes: PlanesSession;
   readonly scene: SceneSession<Placed>;
   readonly geometry: GeometryFetch;
   readonly share: Share;
@@ -66,6 +68,7 @@ export class App {
     this.view = this.makeView();
     this.sky = new SkyFetch({ fetch: access.fetch, show: (bytes) => this.viewer.setSkyPicture(bytes) });
     this.edit = this.makeEdit();
+    this.planes = this.makePlanes();
     this.history = this.makeHistory();
     this.meter = this.makeMeter();
     this.people = new PeopleSession(connection, this.viewer.rig, () => this.viewer.invalidate());
@@ -174,7 +177,23 @@ export class App {
       frameSelection: () => this.view.frameNode(this.edit.selection?.node),
       loadFile: (file) => void this.scene.loadFile(file),
       upload: (file) => this.scene.send(file),
-      documentChanged: (gltf, isWhole) => this.sky.onDocument(gltf, isWhole),
+      documentChanged: (gltf, isWhole) => {
+        this.sky.onDocument(gltf, isWhole);
+        this.planes.refresh();
+      },
+      notAccepted: (text, wanted) => this.notAccepted(text, wanted),
+    });
+  }
+
+  private makePlanes(): PlanesSession {
+    return new PlanesSession({
+      fetch: this.session.access.fetch,
+      document: this.edit.document,
+      picture: this.viewer,
+      notes: this.frame.toasts,
+      add: () => void this.edit.addPlane(),
+      select: (node) => this.edit.select({ node, material: undefined }),
+      edit: (label, patch) => this.edit.make(label, patch),
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
   }
@@ -280,6 +299,7 @@ export class App {
       View: this.view.panel.element,
       Solve: this.solve.panel.element,
       Scene: this.edit.panel.element,
+      Measure: this.planes.panel.element,
       Share: this.share.panel.element,
     });
     this.view.start();

@@ -95,7 +95,7 @@ export function addLamp(gltf: Gltf, translation: Vec3, candela: number): { patch
   return { patch, node };
 }
 
-function attach(gltf: Gltf, list: string, node: number): Patch[number] {
+export function attach(gltf: Gltf, list: string, node: number): Patch[number] {
   const there = valueAt(gltf as unknown as Json, list) !== undefined;
   return there ? { op: 'add', path: `${list}/-`, value: node } : { op: 'add', path: list, value: [node] };
 }
@@ -113,7 +113,7 @@ export function detachNode(gltf: Gltf, node: number): Patch | undefined {
   ];
 }
 
-function freeName(gltf: Gltf, wanted: string): string {
+export function freeName(gltf: Gltf, wanted: string): string {
   const taken = new Set((gltf.nodes ?? []).map((node) => node.name));
   for (let i = 1; ; ++i) {
     const name = i === 1 ? wanted : `${wanted} ${i}`;

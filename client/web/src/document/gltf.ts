@@ -21,6 +21,7 @@ export interface GltfNode {
     KHR_node_visibility?: { visible?: boolean };
     [name: string]: unknown;
   };
+  extras?: Json;
 }
 
 export interface GltfTextureInfo {

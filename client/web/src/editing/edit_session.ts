@@ -4,6 +4,7 @@ import type { Object3D } from 'three';
 import * as edits from '../document/edits';
 import { type Gltf, hangingNodes, isSameScene, nodeName } from '../document/gltf';
 import { handlesOf, lightOf } from '../document/lights';
+import { addPlane, planeOf } from '../document/planes';
 import { setSkyPicture, setSkyTurn } from '../document/skies';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
 import type { Patch, ScenePatchedNote } from '../protocol/messages';
@@ -13,14 +14,14 @@ import type { Frame } from '../ui/frame';
 import { ScenePanel, type Selection } from '../ui/scene_panel';
 import type { GizmoMode } from '../view/controls/gizmo';
 import type { Viewer } from '../view/viewer';
-import { lampAhead, placementOf, written } from './placement';
+import { lampAhead, placementOf, planeOver, written } from './placement';
 
 const HANDLES: readonly GizmoMode[] = ['translate', 'rotate', 'scale'];
 const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
 
 export interface EditHost {
   name: Pick<PageName, 'isMine'>;
-  picture: Pick<Viewer, 'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'invalidate'>;
+  picture: Pick<Viewer, 'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'invalidate' | 'boxOf'>;
   frame: Pick<Frame, 'toasts' | 'setGizmo' | 'showTab' | 'panelOpen'>;
   send: SendEdit;
   /** The steps of undo are others, or `document.lastEdit` is another. */
@@ -104,7 +105,8 @@ export class EditSession {
     this.host.picture.select(this.isPictureOld ? undefined : selection?.node);
     this.offerHandles();
     this.panel.setSelection(selection);
-    if (selection && this.host.frame.panelOpen) this.host.frame.showTab('Scene');
+    if (selection && this.host.frame.panelOpen)
+      this.host.frame.showTab(planeOf(this.document.gltf, selection.node) ? 'Measure' : 'Scene');
   }
 
   /** The document is of another scene than the picture, so the numbers of nodes mean different objects in the two. */
@@ -139,7 +141,7 @@ export class EditSession {
 
   // ---- changes ----
 
-  private make(label: string, patch: Patch, key?: string): void {
+  make(label: string, patch: Patch, key?: string): void {
     this.document.edit(label, patch, key).catch(() => undefined); // the refusal was shown
   }
 
@@ -198,6 +200,21 @@ export class EditSession {
     const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
     try {
       await this.document.edit('Add lamp', patch);
+      this.select({ node, material: undefined });
+    } catch {
+      // The refusal was shown.
+    }
+  }
+
+  /** A measuring plane over the selected object, or in all of the scene. */
+  async addPlane(): Promise<void> {
+    const { picture } = this.host;
+    if (!picture.shown) return;
+    const box = (this.selection && picture.boxOf(this.selection.node)) ?? picture.shown.bounds;
+    const { place, plane } = planeOver(box);
+    const { patch, node } = addPlane(this.document.gltf, place, plane);
+    try {
+      await this.document.edit('Add measuring plane', patch);
       this.select({ node, material: undefined });
     } catch {
       // The refusal was shown.

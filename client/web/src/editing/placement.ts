@@ -3,6 +3,7 @@
 import { Vector3, type Box3, type Object3D, type PerspectiveCamera } from 'three';
 import type { Placement } from '../document/edits';
 import type { Vec3, Vec4 } from '../document/gltf';
+import type { PlaneSpec } from '../document/planes';
 import type { GizmoMode } from '../view/controls/gizmo';
 
 /** The members that the handles of a mode write. Turning and scaling about the object's middle also move its origin. */
@@ -41,6 +42,25 @@ export function lampAhead(
   const reach = bounds.getSize(new Vector3()).length() / 4;
   const candela = Number(((0.5 * Math.PI * reach * reach) / exposure).toPrecision(2));
   return { place: at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3, candela };
+}
+
+/** Metres: of a working plane above the floor, of the band along walls that is left out, and of what is no room. */
+const WORKING_HEIGHT = 0.75;
+const BAND = 0.5;
+const LEAST_ROOM = 3;
+/** A flat object is a floor, and one as high as this is a room; what lies between is a table. */
+const FLAT = 0.2;
+const HIGH = 1.5;
+
+/** A measuring plane over a floor, within a room, or on a table: all of its box. */
+export function planeOver(box: Box3): { place: Vec3; plane: PlaneSpec } {
+  const [size, middle] = [box.getSize(new Vector3()), box.getCenter(new Vector3())];
+  const isTable = size.y > FLAT && size.y < HIGH;
+  const height = isTable ? box.max.y + 0.01 : (size.y < HIGH ? box.max.y : box.min.y) + WORKING_HEIGHT;
+  const rounded = (v: number) => Number(v.toPrecision(4));
+  const [width, depth] = [Math.max(rounded(size.x), 0.1), Math.max(rounded(size.z), 0.1)];
+  const margin = !isTable && Math.min(width, depth) >= LEAST_ROOM ? { margin: BAND } : {};
+  return { place: [rounded(middle.x), rounded(height), rounded(middle.z)], plane: { width, depth, ...margin } };
 }
 
 /** Rounded so that the quaternion keeps unit length to the last digit that counts. */

@@ -220,3 +220,39 @@ export const UNAUTHENTICATED = -32001;
 /** JSON-RPC error: there is no object of that name, or no scene. */
 export const NOT_FOUND = -32004;
 export const STALE_REVISION = -32009;
+
+/** Lux, or percent for daylight factors. */
+export interface PlaneFigures {
+  mean: number;
+  meanError: number;
+  minimum: number;
+  minimumError: number;
+  maximum: number;
+  maximumError: number;
+  median: number;
+  uniformity: number;
+  uniformityError: number;
+  solveError: number;
+}
+
+export type PlaneVerdict = 'passes' | 'fails' | 'undecided';
+
+/** A measuring plane, as `solve.measure` and /planes.json tell it; by point, row by row. */
+export interface MeasuredPlane extends PlaneFigures {
+  node: number;
+  name: string;
+  columns: number;
+  rows: number;
+  lux?: number[];
+  standardError?: number[];
+  target?: { lux?: number; uniformity?: number };
+  verdict?: { lux?: PlaneVerdict; uniformity?: PlaneVerdict; all: PlaneVerdict };
+  daylightFactor?: PlaneFigures & { percent?: number[]; standardError?: number[] };
+}
+
+export interface Planes {
+  revision: number;
+  state: string;
+  error: number;
+  planes: MeasuredPlane[];
+}

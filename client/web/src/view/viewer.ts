@@ -13,7 +13,7 @@ import {
 } from 'three';
 import type { Gltf } from '../document/gltf';
 import { pause } from '../page/pause';
-import type { Sky } from '../protocol/messages';
+import type { MeasuredPlane, Sky } from '../protocol/messages';
 import { Brightness } from './exposure/brightness';
 import { CameraRig } from './controls/camera_rig';
 import type { ExposureMeter } from './exposure/exposure';
@@ -242,6 +242,12 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
+  /** Shows the light on measuring planes, which were measured in the document as it is now. */
+  showPlanes(planes: readonly MeasuredPlane[]): void {
+    this.layouts.showPlanes(planes);
+    this.moved();
+  }
+
   /** Draws where others look from into the picture. */
   showPeople(people: People): void {
     this.people = people;
@@ -278,7 +284,7 @@ export class Viewer {
 
   /** A new lamp has a marker before the geometry has its node. */
   private objectOf(node: number): Object3D | undefined {
-    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node);
+    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node) ?? this.shown?.planes.get(node);
   }
 
   private frame(now: number): void {
@@ -361,6 +367,7 @@ export class Viewer {
   private setSigns(visible: boolean): void {
     this.gizmo.setVisible(visible && !this.mode?.flat);
     for (const lamp of this.shown?.lamps.values() ?? []) lamp.visible = visible;
+    this.shown?.planes.setVisible(visible);
     if (this.people) this.people.root.visible = visible;
   }
 

@@ -29,6 +29,15 @@ export const MIP_STOPS: readonly (readonly [number, number, number])[] = [
   [0.8, 0.2, 0.3],
 ];
 
+/** sRGB, for 0 to 1, as the shader has it. */
+export function paletteColour(t: number): [number, number, number] {
+  const at = Math.min(Math.max(t, 0), 1) * (STOPS.length - 1);
+  const low = Math.min(Math.floor(at), STOPS.length - 2);
+  const [a, b] = [STOPS[low]!, STOPS[low + 1]!];
+  const mix = (c: 0 | 1 | 2) => a[c] + (at - low) * (b[c] - a[c]);
+  return [mix(0), mix(1), mix(2)];
+}
+
 /** As a GLSL array of vec3. */
 export function glslList(stops: typeof STOPS): string {
   const list = stops.map((stop) => `vec3(${stop.map((c) => c.toFixed(3)).join(', ')})`).join(', ');

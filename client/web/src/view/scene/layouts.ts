@@ -4,7 +4,7 @@
 
 import type { WebGLRenderer } from 'three';
 import type { Gltf } from '../../document/gltf';
-import type { LightmapsNote } from '../../protocol/messages';
+import type { LightmapsNote, MeasuredPlane } from '../../protocol/messages';
 import { LightmapSet } from '../light/lightmap_set';
 import type { LitScene } from './lit_scene';
 
@@ -28,6 +28,7 @@ export class Layouts {
   private isKnown = true;
   /** The scene's document as it is now. */
   private document: Gltf = { asset: { version: '2.0' } };
+  private measured: { planes: readonly MeasuredPlane[]; document: Gltf } | undefined;
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -89,7 +90,14 @@ export class Layouts {
 
   /** The document may have been edited since the scene's geometry was made. */
   bringUpToDate(scene: LitScene): void {
+    if (this.measured) scene.planes.take(this.measured.planes, this.measured.document);
     scene.applyDocument(this.document);
+  }
+
+  /** Shows the light on measuring planes, which were measured in the document as it is now. */
+  showPlanes(planes: readonly MeasuredPlane[]): void {
+    this.measured = { planes, document: structuredClone(this.document) };
+    for (const scene of [this.shown, this.stagedScene]) if (scene) this.bringUpToDate(scene);
   }
 
   stage(scene: LitScene, set: LightmapSet): void {

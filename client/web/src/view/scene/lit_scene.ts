@@ -21,7 +21,8 @@ import { lightOf } from '../../document/lights';
 import { LampMarker } from './lamp_marker';
 import { LitMaterial, readSpecularGlossiness, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from '../light/lightmap_set';
-import { trianglesOf } from './object_box';
+import { isSign, trianglesOf } from './object_box';
+import { PlaneMarkers } from './plane_markers';
 
 interface Association {
   nodes?: number;
@@ -34,6 +35,7 @@ export class LitScene {
   readonly source: Gltf;
   readonly nodes = new Map<number, Object3D>();
   readonly lamps = new Map<number, LampMarker>();
+  readonly planes = new PlaneMarkers();
   readonly cameras: { name: string; camera: PerspectiveCamera }[] = [];
   triangles = 0;
   /** The materials have programs for pages of which all light is there. */
@@ -77,7 +79,7 @@ export class LitScene {
     const box = new Box3();
     this.root.updateMatrixWorld(true);
     this.root.traverseVisible((object) => {
-      if (object instanceof Mesh) box.expandByObject(object);
+      if (object instanceof Mesh && !isSign(object)) box.expandByObject(object);
     });
     if (box.isEmpty()) box.setFromCenterAndSize(new Vector3(), new Vector3(1, 1, 1));
     return box;
@@ -87,7 +89,7 @@ export class LitScene {
   applyDocument(gltf: Gltf): void {
     for (const node of this.nodes.keys()) this.applyNode(gltf, node);
     for (const material of this.materials.keys()) this.applyMaterial(gltf, material);
-    this.placeLamps(gltf);
+    this.placeSigns(gltf);
   }
 
   /** Brings the objects of edited members up to date: JSON pointers, which may contain names; none: all. */
@@ -101,7 +103,7 @@ export class LitScene {
       else if (list === 'materials' && elements[index]) this.applyMaterial(gltf, index);
       else return this.applyDocument(gltf);
     }
-    this.placeLamps(gltf);
+    this.placeSigns(gltf);
   }
 
   /** The node that an object belongs to. */
@@ -144,6 +146,7 @@ export class LitScene {
     for (const texture of this.textures) texture.dispose();
     for (const material of this.made.values()) material.dispose();
     for (const lamp of this.lamps.values()) lamp.destroy();
+    this.planes.dispose();
     this.root.removeFromParent();
   }
 
@@ -199,6 +202,11 @@ export class LitScene {
   private applyMaterial(gltf: Gltf, index: number): void {
     const material = gltf.materials?.[index];
     if (material) for (const lit of this.materials.get(index) ?? []) lit.edit(material);
+  }
+
+  private placeSigns(gltf: Gltf): void {
+    this.placeLamps(gltf);
+    this.planes.place(gltf, this.nodes, this.root);
   }
 
   /** Lights without a surface get a small sign that can be picked and dragged. */

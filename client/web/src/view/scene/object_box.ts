@@ -1,15 +1,20 @@
-// The surfaces of an object, and the box around them. The sign of a lamp is no surface.
+// The surfaces of an object, and the box around them. The signs of lamps and planes are no surfaces.
 
 import { Box3, Mesh, type BufferGeometry, type Object3D } from 'three';
 import { LampMarker } from './lamp_marker';
+import { PlaneMarker } from './plane_marker';
 
-/** The meshes of an object, without the signs of lamps. */
+/** The meshes of an object, without the signs of lamps and planes. */
 export function surfacesOf(object: Object3D): Mesh<BufferGeometry>[] {
   const surfaces: Mesh<BufferGeometry>[] = [];
   object.traverse((child) => {
-    if (child instanceof Mesh && !(child.parent instanceof LampMarker)) surfaces.push(child as Mesh<BufferGeometry>);
+    if (child instanceof Mesh && !isSign(child)) surfaces.push(child as Mesh<BufferGeometry>);
   });
   return surfaces;
+}
+
+export function isSign({ parent }: Object3D): boolean {
+  return parent instanceof LampMarker || parent?.parent instanceof PlaneMarker;
 }
 
 export function trianglesOf({ index, attributes }: BufferGeometry): number {

@@ -1,0 +1,60 @@
+// What a lighting designer reads of a measuring plane: mean, minimum, uniformity, and whether they reach what is asked,
+// each with what it is uncertain by. Pure functions of sums; any thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "server/solver/planes/plane_rays.h"
+
+namespace radiosity::solver {
+
+/// Lux, or whatever `unit` of planeFigures() makes of it. Errors are standard errors: of rays, and of what the two
+/// halves of the solve differ by.
+struct PlaneFigures {
+  double mean = 0.0, mean_error = 0.0;
+  /// Of all points. Each is found by one half of the rays and told by the other, both ways round, and so not biased by
+  /// the noise of which the least of many points has the most.
+  double minimum = 0.0, minimum_error = 0.0, maximum = 0.0, maximum_error = 0.0;
+  double median = 0.0;
+  double uniformity = 0.0, uniformity_error = 0.0;  ///< U0: the minimum divided by the mean
+  /// What the mean may be off by since the solve has not ended, or has texels that are too wide; no sampling error.
+  double solve_error = 0.0;
+};
+
+enum class Verdict { kPasses, kFails, kUndecided };
+
+/// Each at a confidence of 95 %; nothing where nothing is asked for. `all`: passes where all do, fails where one does.
+struct PlaneVerdict {
+  std::optional<Verdict> lux, uniformity, all;
+};
+
+/// What is asked for: the mean at least, and U0 at least.
+struct PlaneGoal {
+  std::optional<double> lux, uniformity;
+};
+
+struct PlaneResult {
+  PlaneFigures figures;
+  PlaneVerdict verdict;
+  std::vector<double> light, error;  ///< by point
+};
+
+/// `systematic`: the part of reflected light that the solve may be off by beyond its sampling error; at least 1: it is
+/// not known. `unit`: all that is told is multiplied by it.
+///
+/// Tests, one-sided, by Student's t with rounds - 1 degrees of freedom. The mean passes where its lower bound is not
+/// below what is asked, and fails where its upper bound is. U0 passes where each single point, by its own lower bound,
+/// is at least that part of the mean (an intersection-union test: Berger 1982, "Multiparameter hypothesis testing and
+/// acceptance sampling", so no correction for the number of points is due). It fails where the darkest point by one
+/// half of the rays is below it by the upper bound of the other half. Both bounds widen by what the solve may be off
+/// by. Where both are asked for each test of a failure is at 97.5 %.
+[[nodiscard]] PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGoal& goal,
+                                       double unit = 1.0);
+
+/// The value that Student's t stays below with the probability that a normal one stays below `normal`: Cornish and
+/// Fisher's expansion, good to 0.001 from seven degrees of freedom on.
+[[nodiscard]] double studentQuantile(double normal, double freedom);
+
+}  // namespace radiosity::solver
