@@ -40,7 +40,8 @@ TEST(MeasuringPlanes, ThatAreNotThereAreRefusedByTheirPointer) {
   socket.hello();
   const auto answer = socket.call(SolveMeasureCall{"nobody"});
   EXPECT_EQ(codeOf(answer), -32004);
-  EXPECT_THAT(answer, HasSubstr("/params/plane"));
+  ASSERT_TRUE(answer.error);
+  EXPECT_EQ(answer.error->pointer, "/params/plane");
 }
 
 TEST(MeasuringPlanes, OfManyPointsComeWithoutThemInAMessageAndWithThemByHttp) {

@@ -63,8 +63,10 @@ describe('planes of a document', () => {
 });
 
 describe('a new plane', () => {
-  const over = (low: [number, number, number], high: [number, number, number]) =>
-    planeOver(new Box3(new Vector3(...low), new Vector3(...high)));
+  const box = (low: [number, number, number], high: [number, number, number]) =>
+    new Box3(new Vector3(...low), new Vector3(...high));
+  const scene = box([0, 0, 0], [6, 3, 4]);
+  const over = (...corners: Parameters<typeof box>) => planeOver(box(...corners), scene);
 
   it('hangs 0.75 m above a floor, without the band along walls', () => {
     expect(over([0, 0, 0], [6, 0.1, 4])).toEqual({
@@ -75,6 +77,12 @@ describe('a new plane', () => {
 
   it('hangs as high above the bottom of a room', () => {
     expect(over([0, 0, 0], [6, 3, 4]).place).toEqual([3, 0.75, 2]);
+  });
+
+  it('stays within a small scene', () => {
+    const small = box([0, 0, 0], [0.5, 0.6, 0.5]);
+    expect(planeOver(small, small)).toEqual({ place: [0.25, 0.3, 0.25], plane: { width: 0.5, depth: 0.5 } });
+    expect(planeOver(box([0, 0, 0], [0.5, 0, 0.5]), small).place).toEqual([0.25, 0.3, 0.25]);
   });
 
   it('lies on a table', () => {

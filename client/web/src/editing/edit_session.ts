@@ -210,8 +210,8 @@ export class EditSession {
   async addPlane(): Promise<void> {
     const { picture } = this.host;
     if (!picture.shown) return;
-    const box = (this.selection && picture.boxOf(this.selection.node)) ?? picture.shown.bounds;
-    const { place, plane } = planeOver(box);
+    const { bounds } = picture.shown;
+    const { place, plane } = planeOver((this.selection && picture.boxOf(this.selection.node)) ?? bounds, bounds);
     const { patch, node } = addPlane(this.document.gltf, place, plane);
     try {
       await this.document.edit('Add measuring plane', patch);

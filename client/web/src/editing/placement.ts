@@ -52,11 +52,17 @@ const LEAST_ROOM = 3;
 const FLAT = 0.2;
 const HIGH = 1.5;
 
-/** A measuring plane over a floor, within a room, or on a table: all of its box. */
-export function planeOver(box: Box3): { place: Vec3; plane: PlaneSpec } {
+/**
+ * A measuring plane over a floor, within a room, or on a table: all of its box. `scene`: its box; a plane is no higher
+ * than half of what is above the floor there.
+ */
+export function planeOver(box: Box3, scene: Box3): { place: Vec3; plane: PlaneSpec } {
   const [size, middle] = [box.getSize(new Vector3()), box.getCenter(new Vector3())];
-  const isTable = size.y > FLAT && size.y < HIGH;
-  const height = isTable ? box.max.y + 0.01 : (size.y < HIGH ? box.max.y : box.min.y) + WORKING_HEIGHT;
+  const isRoom = size.y >= HIGH || box.equals(scene);
+  const isTable = !isRoom && size.y > FLAT;
+  const floor = isRoom ? box.min.y : box.max.y;
+  const room = scene.max.y - floor;
+  const height = isTable ? box.max.y + 0.01 : floor + (room > 0 ? Math.min(WORKING_HEIGHT, room / 2) : WORKING_HEIGHT);
   const rounded = (v: number) => Number(v.toPrecision(4));
   const [width, depth] = [Math.max(rounded(size.x), 0.1), Math.max(rounded(size.z), 0.1)];
   const margin = !isTable && Math.min(width, depth) >= LEAST_ROOM ? { margin: BAND } : {};
