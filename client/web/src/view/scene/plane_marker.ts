@@ -36,6 +36,8 @@ function quad(): BufferGeometry {
 }
 
 const QUAD = quad();
+/** The corners alone: lines would follow the triangles. */
+const EDGE = quad().setIndex(null);
 
 /** Three digits are as many as anyone reads. */
 export function cellText(value: number): string {
@@ -82,7 +84,7 @@ export class PlaneMarker extends Object3D {
   constructor(readonly node: number) {
     super();
     this.line.color.setRGB(0.2, 0.8, 0.9, LinearSRGBColorSpace);
-    this.shape.add(this.grid, new LineLoop(QUAD, this.line));
+    this.shape.add(this.grid, new LineLoop(EDGE, this.line));
     this.add(this.shape);
     this.grid.visible = false;
   }
