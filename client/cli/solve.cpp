@@ -261,8 +261,6 @@ class Solve {
       warn(fmt::format("the server stopped at {}: another client changed its settings", percentText(error.total)));
     auto written = save();
     if (!written) return complainOf(CallFailure{written.error()});
-    auto measured = options_.measure.wanted ? measurePlanes(remote_, options_.measure, display_) : std::string();
-    if (!measured) return complainOf(CallFailure{measured.error()});
     addSurfaceError(connection, status);
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
@@ -273,6 +271,8 @@ class Solve {
     for (const auto& warning : status.warnings)
       if (passed_on_.find(warning) == std::string::npos) warn(warning);
     for (const auto& name : *written) std::printf("%s\n", name.c_str());
+    auto measured = options_.measure.wanted ? measurePlanes(remote_, options_.measure, display_) : std::string();
+    if (!measured) return complainOf(CallFailure{measured.error()});
     std::fputs(measured->c_str(), stdout);
     const auto& failure = status.progress.failure;
     const std::string why =

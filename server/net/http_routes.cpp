@@ -202,16 +202,19 @@ void measure(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respon
              std::string (*write)(const protocol::Planes&)) {
   auto wanted = queryMeasure(request);
   if (!wanted) return done(errorResponse(wanted.error()));
+  const auto encode = [write](Result<engine::MeasureReport> report) -> Result<SharedBytes> {
+    if (report) {
+      const auto text = write(toPlanes(*report));
+      return std::make_shared<const Bytes>(text.begin(), text.end());
+    }
+    auto error = report.error();
+    if (error.where == "plane") error.where = "?plane=";
+    return tl::unexpected<Error>(std::move(error));
+  };
   hub->engine().measure(
       std::move(*wanted), clientOf(request),
-      hub->fromEngine<engine::MeasureReport>([done, type, write](Result<engine::MeasureReport> report) {
-        if (report) {
-          const auto text = write(toPlanes(*report));
-          return done(file(std::make_shared<const Bytes>(text.begin(), text.end()), type));
-        }
-        auto error = report.error();
-        if (error.where == "plane") error.where = "?plane=";
-        done(errorResponse(error));
+      hub->fromEngineMade<engine::MeasureReport>(encode, [done, type](const Result<SharedBytes>& bytes) {
+        done(bytes ? file(*bytes, type) : errorResponse(bytes.error()));
       }));
 }
 

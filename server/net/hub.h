@@ -128,6 +128,14 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
       self->enter([&] { visit(std::move(result)); });
     };
   }
+  /// The same; `make` is done before that, on the engine's thread: what takes long must not hold up others.
+  template <typename T, typename Make, typename F>
+  [[nodiscard]] engine::Engine::Callback<T> fromEngineMade(Make make, F visit) {
+    return [self = shared_from_this(), make = std::move(make), visit = std::move(visit)](Result<T> result) {
+      auto made = make(std::move(result));
+      self->enter([&] { visit(std::move(made)); });
+    };
+  }
   void shut();
 
   void onProgress(const engine::Status& status) override;

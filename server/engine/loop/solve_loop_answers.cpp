@@ -142,10 +142,12 @@ void SolveLoop::measure(MeasureRequest request, Client client, Callback<MeasureR
   askLong<MeasureReport>(client, std::move(done), [this, request = std::move(request)]() -> Result<MeasureReport> {
     MeasureReport report;
     const auto parts = fromSolveThread([this, request, &report]() -> Result<PlaneParts> {
+      // Light on finer texels is not shown before it is as good, and not measured either.
+      const auto& lit = coarser_ && !lit_->showsOwnLight() ? *coarser_ : *lit_;
       report.revision = revision_;
       report.state = state_;
-      report.error = lit_->shownError();
-      return readPlanes(*lit_, request);
+      report.error = lit.showsOwnLight() ? lit.shownError() : lit.solver().error().total;
+      return readPlanes(lit, request);
     });
     if (!parts) return tl::unexpected<Error>(parts.error());
     report.planes = measurePlanes(*parts, request);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -24,13 +25,41 @@ constexpr double kWantedError = 0.01;
 constexpr double kOutsideLux = 10'000.0, kGround = 0.2;
 constexpr double kPercent = 100.0;
 
-/// Light that is unshot, and texels that are too wide, make an error that no halves differ by.
-double systematicPart(const LitScene& lit) {
-  const auto& solver = lit.solver();
-  const bool is_known = lit.settings().method != Method::kPaper && !lit.isStale() && !solver.isRepairing() &&
-                        !solver.isUnsettled() && solver.rounds() > 0;
-  return is_known ? std::min(1.0, std::hypot(solver.error().residual, solver.error().variation)) : 1.0;
+/// In a name that is told with a measurement.
+constexpr std::size_t kMostName = 100;
+
+/// What smoothing has in common in both halves, as part of all light.
+double commonPart(const LitScene& lit, const std::vector<glm::vec3>& light) {
+  const auto common = lit.solver().commonErrorSquared();
+  const auto& area = lit.patches().node_area;
+  double squares = 0.0, all = 0.0;
+  for (std::size_t n = 0; n < common.size(); ++n) {
+    squares += static_cast<double>(area[n] * (common[n].x + common[n].y + common[n].z));
+    all += static_cast<double>(area[n] * glm::dot(light[n], light[n]));
+  }
+  return all > 0.0 ? std::sqrt(squares / all) : 0.0;
 }
+
+/// Light that is unshot, texels that are too wide, and smoothing make an error that no halves differ by.
+double systematicPart(const LitScene& lit, const std::vector<glm::vec3>& light) {
+  const auto& solver = lit.solver();
+  const bool is_known = lit.settings().method != Method::kPaper && !lit.isStale() && lit.showsOwnLight() &&
+                        !solver.isRepairing() && !solver.isUnsettled() && solver.rounds() > 0;
+  if (!is_known) return 1.0;
+  return std::min(1.0, std::hypot(solver.error().residual, solver.error().variation, commonPart(lit, light)));
+}
+
+/// Cut between characters.
+std::string shortName(std::string name) {
+  if (name.size() <= kMostName) return name;
+  std::size_t end = kMostName;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
+  name.resize(end);
+  return name;
+}
+
+/// Unit boxes from the scene, beyond which rays are none.
+constexpr double kFar = 1e9;
 
 bool isAskedFor(const scene::MeasuringPlane& plane, const std::string& which) {
   return which.empty() || plane.name == which || std::to_string(plane.node) == which;
@@ -79,7 +108,7 @@ solver::PlaneResult resultOf(const solver::PlaceLight& light, const scene::Measu
 MeasuredPlane placed(const scene::MeasuringPlane& plane) {
   MeasuredPlane made;
   made.node = plane.node;
-  made.name = plane.name;
+  made.name = shortName(plane.name);
   made.columns = plane.columns;
   made.rows = plane.rows;
   made.place = {plane.pointAt(0, 0), plane.across / static_cast<double>(plane.columns),
@@ -130,12 +159,16 @@ Result<PlaneParts> readPlanes(const LitScene& lit, const MeasureRequest& request
     return fail(ErrorCode::kNotFound, "there is no measuring plane of this name, or on the node of this number",
                 "plane");
   if (parts.planes.empty()) return parts;
+  for (const auto& plane : parts.planes)
+    if (!(glm::distance(plane.corner, lit.patches().centre) <= kFar * lit.patches().scale))
+      return fail(ErrorCode::kInvalidScene, "lies a thousand million times as far away as the scene is large",
+                  scene::place(lit.document().name, "/nodes/" + std::to_string(plane.node) + "/extras/radiosityPlane"));
   parts.patches = lit.sharedPatches();
   parts.materials = lit.materials();
   parts.sources = lit.sources();
   parts.seed = lit.settings().seed;
-  parts.systematic = systematicPart(lit);
   parts.irradiance = lit.ownLight().mean;
+  parts.systematic = systematicPart(lit, parts.irradiance);
   parts.difference = lit.solver().halfIrradiance(0);
   const auto second = lit.solver().halfIrradiance(1);
   for (std::size_t n = 0; n < second.size(); ++n) parts.difference[n] -= second[n];

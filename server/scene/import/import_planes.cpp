@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kMember = "radiosityPlane";
 /// Metres, of a side in the node's space and in the world.
-constexpr double kMostSide = 1e6;
+constexpr double kMostSide = 1e6, kLeastSide = 1e-6, kFarthest = 1e9;
 constexpr double kMostLux = 1e9;
 /// Of the cosine between the sides of a rectangle.
 constexpr double kSquare = 1e-3;
@@ -75,11 +75,13 @@ class PlaneReader {
     made.down = (*depth - 2.0 * *margin) * z;
     made.corner = glm::dvec3(node_.world[3]) - 0.5 * (made.across + made.down);
     const double wide = glm::length(made.across), deep = glm::length(made.down);
-    if (!(wide > 0.0 && deep > 0.0 && wide <= kMostSide && deep <= kMostSide))
-      return bad(pointer_, "its sides must be above 0 and at most 1000 km long as the node scales it");
+    if (!(wide >= kLeastSide && deep >= kLeastSide && wide <= kMostSide && deep <= kMostSide))
+      return bad(pointer_, "its sides must be from 1 um to 1000 km long as the node scales it");
+    for (int c = 0; c < 3; ++c)
+      if (!(std::abs(made.corner[c]) <= kFarthest)) return bad(pointer_, "must lie within 1e9 m of the origin");
     if (std::abs(glm::dot(made.across, made.down)) > kSquare * wide * deep)
       return bad(pointer_, "must stay a rectangle: the transforms above its node shear it");
-    const auto normal = glm::normalize(glm::cross(z, x));
+    const auto normal = glm::normalize(glm::cross(made.down / deep, made.across / wide));
     made.normal = glm::dot(normal, y) < 0.0 ? -normal : normal;
     return {};
   }

@@ -18,7 +18,8 @@ std::uint64_t wholeCells(double cells) {
 
 PlaneGrid usualGrid(double width, double depth) {
   const double longer = std::max(width, depth), shorter = std::min(width, depth);
-  const bool is_strip = longer >= 2.0 * shorter;
+  constexpr double kRounding = 1e-6;  // a plane of 2 : 1 has one grid however it is turned
+  const bool is_strip = longer >= (2.0 - kRounding) * shorter;
   const double side = is_strip ? shorter : longer, other = is_strip ? longer : shorter;
   const double wanted = std::min(kWidestCell, 0.2 * std::pow(5.0, std::log10(side)));
   const auto cells = wholeCells(side / wanted);

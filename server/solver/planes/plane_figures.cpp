@@ -1,25 +1,28 @@
 #include "server/solver/planes/plane_figures.h"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 namespace radiosity::solver {
 namespace {
 
-/// Normal quantiles of 95 % and 97.5 %, one-sided.
-constexpr double kSingle = 1.6448536, kOfTwo = 1.9599640;
+/// Confidence, one-sided; of each of two tests.
+constexpr double kSingle = 0.95, kOfTwo = 0.975;
+/// More of all light than this may not be missing where anything is to be judged.
+constexpr double kMostOff = 0.1;
 
 double squared(double x) { return x * x; }
 
-/// Of a plane: what its points tell, in lux.
+/// What the points of a plane tell, in lux.
 struct Estimates {
   double rounds = 0.0;
-  std::vector<double> light, reflected;     ///< by point
+  std::vector<double> light;                ///< by point
   std::vector<double> variance;             ///< of rays alone: withNeighbours()
   std::array<std::vector<double>, 2> half;  ///< light by even rounds alone, and by odd ones
   double solve = 0.0;                       ///< variance that the halves of the solve tell of
-  double mean = 0.0, mean_variance = 0.0;   ///< all of it
-  double mean_reflected = 0.0;
+  double mean = 0.0, rays_of_mean = 0.0;    ///< its variance by rays alone
+  [[nodiscard]] double meanVariance() const { return rays_of_mean + solve; }
 };
 
 /// Of what points are off by, the noise of the rays that tell it is taken away. As part of the mean all of it counts,
@@ -57,10 +60,8 @@ Estimates estimatesOf(const PlaneRays& rays) {
   for (const auto& point : rays.points()) {
     const double sum = point.light[0] + point.light[1];
     of.light.push_back(sum / of.rounds);
-    of.reflected.push_back(point.reflected / of.rounds);
     of.variance.push_back(varianceOfMean(sum, point.squares[0] + point.squares[1], of.rounds));
     for (std::size_t h = 0; h < 2; ++h) of.half[h].push_back(2.0 * point.light[h] / of.rounds);
-    of.mean_reflected += of.reflected.back() / static_cast<double>(rays.points().size());
   }
   double sum = 0.0, squares = 0.0;
   for (const double mean : rays.means()) {
@@ -70,7 +71,7 @@ Estimates estimatesOf(const PlaneRays& rays) {
   of.variance = withNeighbours(of.variance, rays.grid());
   of.solve = solveVariance(rays, of.rounds);
   of.mean = sum / of.rounds;
-  of.mean_variance = varianceOfMean(sum, squares, of.rounds) + of.solve;
+  of.rays_of_mean = varianceOfMean(sum, squares, of.rounds);
   return of;
 }
 
@@ -93,10 +94,13 @@ Extreme extremeOf(const Estimates& of, Before before) {
   return extreme;
 }
 
+/// Of the light that there is, what the solve may lack, or have too much of.
+double missing(double systematic) { return systematic < 0.5 ? systematic / (1.0 - systematic) : 1.0; }
+
 PlaneFigures figuresOf(const Estimates& of, double systematic) {
   PlaneFigures figures;
   figures.mean = of.mean;
-  figures.mean_error = std::sqrt(of.mean_variance);
+  figures.mean_error = std::sqrt(of.meanVariance());
   const auto least = extremeOf(of, std::less<>()), greatest = extremeOf(of, std::greater<>());
   // Noise may put either beyond the mean, where it cannot be.
   figures.minimum = std::min(least.value, of.mean);
@@ -109,9 +113,9 @@ PlaneFigures figuresOf(const Estimates& of, double systematic) {
   if (of.mean > 0.0) {
     figures.uniformity = figures.minimum / of.mean;
     figures.uniformity_error =
-        std::sqrt(squared(least.error) + squared(figures.uniformity) * of.mean_variance) / of.mean;
+        std::sqrt(squared(least.error) + squared(figures.uniformity) * of.meanVariance()) / of.mean;
   }
-  figures.solve_error = systematic * of.mean_reflected;
+  figures.solve_error = missing(systematic) * of.mean;
   return figures;
 }
 
@@ -119,53 +123,59 @@ Verdict verdictOf(bool passes, bool fails) {
   return passes ? Verdict::kPasses : fails ? Verdict::kFails : Verdict::kUndecided;
 }
 
+/// Variance of an estimate by rays, which scatter from round to round, and by the solve.
+struct Variance {
+  double rays = 0.0, rounds = 0.0, solve = 0.0;
+
+  /// How far off it is at most, at this confidence, one-sided. Two halves of one solve have one degree of freedom,
+  /// since they may differ by the same amount everywhere (Welch and Satterthwaite's approximation of those of the sum).
+  [[nodiscard]] double bound(double confidence) const {
+    const double sum = rays + solve;
+    if (!(sum > 0.0)) return 0.0;
+    const double freedom = squared(sum) / (squared(rays) / (rounds - 1.0) + squared(solve));
+    return studentQuantile(confidence, freedom) * std::sqrt(sum);
+  }
+};
+
 class Tests {
  public:
   Tests(const Estimates& of, double systematic, bool are_two)
-      : of_(of),
-        systematic_(systematic),
-        passes_(studentQuantile(kSingle, of.rounds - 1.0)),
-        fails_(studentQuantile(are_two ? kOfTwo : kSingle, of.rounds - 1.0)),
-        fails_half_(studentQuantile(are_two ? kOfTwo : kSingle, 0.5 * of.rounds - 1.0)) {}
+      : of_(of), off_(missing(systematic) * of.mean), failing_(are_two ? kOfTwo : kSingle) {}
 
   [[nodiscard]] Verdict mean(double lux) const {
-    const double above = of_.mean - lux, error = std::sqrt(of_.mean_variance);
-    const double off = systematic_ * of_.mean_reflected;
-    return verdictOf(above - passes_ * error - off >= 0.0, above + fails_ * error + off < 0.0);
+    const Variance variance{of_.rays_of_mean, of_.rounds, of_.solve};
+    const double above = of_.mean - lux;
+    return verdictOf(above - variance.bound(kSingle) - off_ >= 0.0, above + variance.bound(failing_) + off_ < 0.0);
   }
 
+  /// A point and the mean, which it is compared with, may be off by what the solve lacks in opposite directions.
   [[nodiscard]] Verdict uniformity(double wanted) const {
+    const double off = (1.0 + wanted) * off_;
     bool passes = of_.mean > 0.0;
     for (std::size_t i = 0; i < of_.light.size() && passes; ++i)
-      passes = above(of_.light[i], i, wanted) - passes_ * error(of_.variance[i], wanted) - off(i, wanted) >= 0.0;
+      passes = above(of_.light[i], wanted) - ofPoint(of_.variance[i], of_.rounds, wanted).bound(kSingle) - off >= 0.0;
     const auto found = std::min_element(of_.half[0].begin(), of_.half[0].end());
     const auto i = static_cast<std::size_t>(found - of_.half[0].begin());
     // Half of the rays: twice the variance.
-    const double bound = above(of_.half[1][i], i, wanted) + fails_half_ * error(2.0 * of_.variance[i], wanted);
-    return verdictOf(passes, bound + off(i, wanted) < 0.0);
+    const double bound = ofPoint(2.0 * of_.variance[i], 0.5 * of_.rounds, wanted).bound(failing_);
+    return verdictOf(passes, above(of_.half[1][i], wanted) + bound + off < 0.0);
   }
 
  private:
-  [[nodiscard]] double above(double light, std::size_t /*point*/, double wanted) const {
-    return light - wanted * of_.mean;
-  }
-  [[nodiscard]] double error(double of_rays, double wanted) const {
-    return std::sqrt(of_rays + of_.solve + squared(wanted) * of_.mean_variance);
-  }
-  /// What the solve may be off by changes the point and the mean at the same time.
-  [[nodiscard]] double off(std::size_t point, double wanted) const {
-    return systematic_ * std::abs(of_.reflected[point] - wanted * of_.mean_reflected);
+  [[nodiscard]] double above(double light, double wanted) const { return light - wanted * of_.mean; }
+  [[nodiscard]] Variance ofPoint(double of_rays, double rounds, double wanted) const {
+    return {of_rays + squared(wanted) * of_.rays_of_mean, rounds, squared(1.0 + wanted) * of_.solve};
   }
 
   const Estimates& of_;
-  double systematic_, passes_, fails_, fails_half_;
+  double off_, failing_;
 };
 
 PlaneVerdict verdictOn(const Estimates& of, double systematic, const PlaneGoal& goal) {
   PlaneVerdict verdict;
   if (!goal.lux && !goal.uniformity) return verdict;
   const Tests tests(of, systematic, goal.lux && goal.uniformity);
-  const bool is_known = systematic < 1.0;
+  const bool is_known = systematic <= kMostOff;
   if (goal.lux) verdict.lux = is_known ? tests.mean(*goal.lux) : Verdict::kUndecided;
   if (goal.uniformity) verdict.uniformity = is_known ? tests.uniformity(*goal.uniformity) : Verdict::kUndecided;
   const auto is = [&](Verdict which) { return verdict.lux == which || verdict.uniformity == which; };
@@ -177,10 +187,8 @@ PlaneVerdict verdictOn(const Estimates& of, double systematic, const PlaneGoal& 
 
 }  // namespace
 
-double studentQuantile(double normal, double freedom) {
-  const double z = normal, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return z + (z3 + z) / (4.0 * freedom) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * freedom * freedom) +
-         (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * freedom * freedom * freedom);
+double studentQuantile(double confidence, double freedom) {
+  return boost::math::quantile(boost::math::students_t(freedom), confidence);
 }
 
 PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGoal& goal, double unit) {

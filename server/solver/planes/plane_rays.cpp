@@ -71,9 +71,10 @@ bool PlaneRays::isSure(double wanted) const {
 }
 
 void PlaneRays::measure(double wanted) {
-  const auto affordable = kMostRays / (std::uint64_t{kRays} * points_.size());
-  const auto most = std::clamp<std::uint64_t>(affordable, kLeastRounds, kMostRounds);
-  while (rounds() < kLeastRounds || (rounds() + 2 <= most && !isSure(wanted))) addRounds();
+  const auto of_round = (kRays + light_.looksAPoint()) * points_.size();
+  const auto most = std::clamp<std::uint64_t>(kMostRays / of_round, kFewestRounds, kMostRounds);
+  while (rounds() < std::min<std::uint64_t>(most, kLeastRounds) || (rounds() + 2 <= most && !isSure(wanted)))
+    addRounds();
 }
 
 }  // namespace radiosity::solver

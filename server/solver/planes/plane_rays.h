@@ -36,8 +36,8 @@ class PlaneRays {
  public:
   /// Of a point and round.
   static constexpr std::uint32_t kRays = 32;
-  /// Always even, so that both halves have as many.
-  static constexpr std::uint32_t kLeastRounds = 16, kMostRounds = 512;
+  /// Always even, so that both halves have as many. The fewest where more would be beyond kMostRays.
+  static constexpr std::uint32_t kFewestRounds = 8, kLeastRounds = 16, kMostRounds = 512;
 
   /// `light` is to outlive it; `key`: the same gives the same bits, whatever the number of threads.
   PlaneRays(const PlaceLight& light, const PlaneGrid& grid, std::uint64_t key);
@@ -56,7 +56,7 @@ class PlaneRays {
   [[nodiscard]] const std::vector<double>& means() const { return means_; }
 
  private:
-  /// In all, beyond those of the first rounds.
+  /// In all, those towards lamps included, beyond those of the fewest rounds.
   static constexpr std::uint64_t kMostRays = std::uint64_t{1} << 25;
 
   void addRound();

@@ -100,6 +100,12 @@ PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, s
   return {direct(spot, mixKeys(key, 1), Looks::kAll), gathered.light, gathered.off};
 }
 
+std::uint64_t PlaceLight::looksAPoint() const {
+  std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0);
+  for (const auto& source : sources_) looks += source.kind == PunctualLights::Source::Kind::kLamp ? kLampLooks : 1;
+  return looks;
+}
+
 /// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
 PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const {
   const Sobol4 draws(key);

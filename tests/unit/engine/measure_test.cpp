@@ -139,8 +139,7 @@ TEST_F(Planes, WithinAClosedRoomHaveNoDaylight) {
   EXPECT_EQ(report->planes.front().daylight_factor->maximum, 0.0);
 }
 
-// What is not solved for is not judged.
-TEST_F(Planes, WhileTheSolveIsUnderWayAreUndecided) {
+TEST_F(Planes, OnASolveWhoseErrorNobodyKnowsAreUndecided) {
   ASSERT_TRUE(configure([](engine::SolveSettings& settings) { settings.method = Method::kPaper; }));
   solve(blockRoom());
   ASSERT_TRUE(add(R"(, "target": {"lux": 0.001, "uniformity": 0.001})"));

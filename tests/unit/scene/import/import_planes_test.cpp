@@ -77,6 +77,7 @@ TEST(MeasuringPlanes, HaveTheGridOfTheStandard) {
   EXPECT_EQ(grid(10.0, 6.0), Grid(10, 6)) << "below 2 : 1 the longer side counts";
   EXPECT_EQ(grid(6.0, 10.0), Grid(6, 10));
   EXPECT_EQ(grid(10.0, 5.0), Grid(16, 8)) << "at 2 : 1 the shorter side counts";
+  EXPECT_EQ(grid(10.0 * (1.0 - 1e-12), 5.0), Grid(16, 8)) << "as a plane that is turned has it";
   EXPECT_EQ(grid(100.0, 100.0), Grid(20, 20));
   EXPECT_EQ(grid(1000.0, 1000.0), Grid(100, 100)) << "no cell is wider than 10 m";
   EXPECT_EQ(grid(0.01, 0.01), Grid(1, 1)) << "p is 0.008 m there";
@@ -121,7 +122,12 @@ TEST(MeasuringPlanes, OfWrongSizeAreRefused) {
 
 TEST(MeasuringPlanes, ThatTheNodeFlattensOrShearsAreRefused) {
   const Json plane{{"width", 2.0}, {"depth", 3.0}};
-  expectRefused(withPlane(plane, {{"scale", {0, 1, 1}}}), ErrorCode::kInvalidScene, kPointer, "above 0");
+  expectRefused(withPlane(plane, {{"scale", {0, 1, 1}}}), ErrorCode::kInvalidScene, kPointer, "from 1 um");
+  // What has no normal, and what no ray reaches, ended the server.
+  expectRefused(withPlane(plane, {{"scale", {1e-155, 1e-155, 1e-155}}}), ErrorCode::kInvalidScene, kPointer,
+                "from 1 um");
+  for (const double far : {1e10, 2e18, 1e30})
+    expectRefused(withPlane(plane, {{"translation", {far, 0, 0}}}), ErrorCode::kInvalidScene, kPointer, "within 1e9 m");
   const Json sheared{1, 0, 0, 0, 0, 1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1};
   expectRefused(withPlane(plane, {{"matrix", sheared}}), ErrorCode::kInvalidScene, kPointer, "rectangle");
 }

@@ -10,11 +10,11 @@ namespace {
 
 // From tables of Student's distribution, one-sided.
 TEST(StudentQuantile, IsThatOfTables) {
-  EXPECT_NEAR(studentQuantile(1.6448536, 7.0), 1.895, 2e-3);
-  EXPECT_NEAR(studentQuantile(1.6448536, 15.0), 1.753, 1e-3);
-  EXPECT_NEAR(studentQuantile(1.9599640, 15.0), 2.131, 1e-3);
-  EXPECT_NEAR(studentQuantile(1.9599640, 7.0), 2.365, 5e-3);
-  EXPECT_NEAR(studentQuantile(1.6448536, 1e6), 1.645, 1e-3);
+  EXPECT_NEAR(studentQuantile(0.95, 1.0), 6.314, 1e-3);
+  EXPECT_NEAR(studentQuantile(0.95, 15.0), 1.753, 1e-3);
+  EXPECT_NEAR(studentQuantile(0.975, 15.0), 2.131, 1e-3);
+  EXPECT_NEAR(studentQuantile(0.975, 7.0), 2.365, 1e-3);
+  EXPECT_NEAR(studentQuantile(0.95, 1e6), 1.645, 1e-3);
 }
 
 /// A plane near a floor that sends 40 lm/m^2 on one half and, on the other, `other`.
@@ -48,6 +48,9 @@ TEST_F(Verdicts, OnTheMeanKnowThreeAnswers) {
   EXPECT_EQ(judged({39.0, {}}).verdict.lux, Verdict::kPasses);
   EXPECT_EQ(judged({41.0, {}}).verdict.lux, Verdict::kFails);
   EXPECT_EQ(judged({39.0, {}}, 0.0, 4.0F).verdict.lux, Verdict::kUndecided) << "the halves make it 40 +- 1";
+  EXPECT_EQ(judged({35.0, {}}, 0.0, 4.0F).verdict.lux, Verdict::kUndecided) << "two halves: 6.3 times that";
+  EXPECT_EQ(judged({32.0, {}}, 0.0, 4.0F).verdict.lux, Verdict::kPasses);
+  EXPECT_EQ(judged({48.0, {}}, 0.0, 4.0F).verdict.lux, Verdict::kFails);
   EXPECT_EQ(judged({39.0, {}}, 0.05).verdict.lux, Verdict::kUndecided) << "the solve may be off by 2";
   EXPECT_EQ(judged({30.0, {}}, 0.05).verdict.lux, Verdict::kPasses);
   EXPECT_EQ(judged({50.0, {}}, 0.05).verdict.lux, Verdict::kFails);
@@ -59,6 +62,11 @@ TEST_F(Verdicts, OnUniformityKnowThreeAnswers) {
   EXPECT_NEAR(judged({{}, 0.3}, 0.0, 0.0F, 10.0F).figures.uniformity, 0.4, 0.005);
   EXPECT_EQ(judged({{}, 0.35}, 0.0, 0.0F, 10.0F).verdict.uniformity, Verdict::kPasses);
   EXPECT_EQ(judged({{}, 0.45}, 0.0, 0.0F, 10.0F).verdict.uniformity, Verdict::kFails);
+  // What the solve may be off by counts at the point and in the mean: 0.05 of 40 lux, and 1.9 times that.
+  EXPECT_EQ(judged({{}, 0.97}, 0.05).verdict.uniformity, Verdict::kUndecided);
+  EXPECT_EQ(judged({{}, 0.8}, 0.05).verdict.uniformity, Verdict::kPasses);
+  EXPECT_EQ(judged({{}, 0.45}, 0.05, 0.0F, 10.0F).verdict.uniformity, Verdict::kUndecided);
+  EXPECT_EQ(judged({{}, 0.6}, 0.05, 0.0F, 10.0F).verdict.uniformity, Verdict::kFails);
   EXPECT_EQ(judged({{}, 0.4}, 0.0, 2.0F, 10.0F).verdict.uniformity, Verdict::kUndecided);
 }
 
@@ -70,6 +78,7 @@ TEST_F(Verdicts, AllPassWhereBothDoAndFailWhereOneDoes) {
 }
 
 TEST_F(Verdicts, OnASolveOfUnknownErrorAreUndecided) {
+  EXPECT_EQ(judged({1.0, 0.1}, 0.11).verdict.all, Verdict::kUndecided) << "a tenth of the light may be missing";
   EXPECT_EQ(judged({1.0, 0.1}, 1.0).verdict.all, Verdict::kUndecided);
   EXPECT_EQ(judged({1000.0, 0.1}, 1.0).verdict.all, Verdict::kUndecided);
 }
