@@ -83,6 +83,7 @@ json toJson(const Progress& p) {
               {"energy",
                {{"emitted", p.energy.emitted},
                 {"absorbed", p.energy.absorbed},
+                {"specular", p.energy.specular},
                 {"escaped", p.energy.escaped},
                 {"backface", p.energy.backface},
                 {"unshot", p.energy.unshot},
@@ -122,6 +123,7 @@ void read(Reader& r, Progress& p) {
   r.object("energy", Need::kOptional, [&](Reader& e) {
     e.number("emitted", p.energy.emitted, Need::kRequired, kAny);
     e.number("absorbed", p.energy.absorbed, Need::kRequired, kAny);
+    e.number("specular", p.energy.specular, Need::kOptional, kAny);
     e.number("escaped", p.energy.escaped, Need::kRequired, kAny);
     e.number("backface", p.energy.backface, Need::kRequired, kAny);
     e.number("unshot", p.energy.unshot, Need::kRequired, kAny);

@@ -59,6 +59,7 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
               {"energy",
                {{"emitted", progress.energy.emitted},
                 {"absorbed", progress.energy.absorbed},
+                {"specular", progress.energy.specular},
                 {"escaped", progress.energy.escaped},
                 {"backface", progress.energy.backface},
                 {"unshot", progress.energy.unshot},
@@ -104,10 +105,10 @@ std::string statusText(const protocol::StatusReply& status) {
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
   row("scene", fmt::format("{} polygons, {} surfaces, {} patches, {} nodes", countText(p.polygons),
                            countText(p.surfaces), countText(p.patches), countText(p.nodes)));
-  row("energy", fmt::format("emitted {:.6g} lm: absorbed {:.6g}, escaped {:.6g}, back faces {:.6g}, unshot {:.6g}, "
-                            "imbalance {:.3g}",
-                            p.energy.emitted, p.energy.absorbed, p.energy.escaped, p.energy.backface, p.energy.unshot,
-                            p.energy.imbalance));
+  row("energy", fmt::format("emitted {:.6g} lm: absorbed {:.6g}, specular {:.6g}, escaped {:.6g}, back faces {:.6g}, "
+                            "unshot {:.6g}, imbalance {:.3g}",
+                            p.energy.emitted, p.energy.absorbed, p.energy.specular, p.energy.escaped, p.energy.backface,
+                            p.energy.unshot, p.energy.imbalance));
   row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m)
                                      : (s.choosesTexels() ? "as light wants them, " + countText(s.texels) + " at most"
                                                           : "about " + countText(s.texels)));

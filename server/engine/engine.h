@@ -49,9 +49,11 @@ struct SurfaceEstimate {
 };
 
 /// Luminous flux, lumens (luminance: the channels weighted by Rec. 709).
-/// emitted = absorbed + escaped + backface + unshot + imbalance.
+/// emitted = absorbed + specular + escaped + backface + unshot + imbalance.
 struct EnergyBalance {
-  double emitted = 0.0, absorbed = 0.0, escaped = 0.0, backface = 0.0, unshot = 0.0;
+  double emitted = 0.0, absorbed = 0.0;
+  double specular = 0.0;  ///< kept by mirrors, metal and what lies under smooth coats; `absorbed` is of the others
+  double escaped = 0.0, backface = 0.0, unshot = 0.0;
   /// What unbiased sampling lost by chance (negative: gained); it falls with the sampling error.
   double imbalance = 0.0;
 };

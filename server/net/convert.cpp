@@ -57,8 +57,9 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.error = toErrorParts(s.error);
   p.error.measuring = s.probes_surface;
   if (s.surface_error) p.error.p95 = finite(s.surface_error->p95, 1e9);
-  p.energy = {finite(s.energy.emitted, 0.0),  finite(s.energy.absorbed, 0.0), finite(s.energy.escaped, 0.0),
-              finite(s.energy.backface, 0.0), finite(s.energy.unshot, 0.0),   finite(s.energy.imbalance, 0.0)};
+  p.energy = {finite(s.energy.emitted, 0.0),  finite(s.energy.absorbed, 0.0), finite(s.energy.specular, 0.0),
+              finite(s.energy.escaped, 0.0),  finite(s.energy.backface, 0.0), finite(s.energy.unshot, 0.0),
+              finite(s.energy.imbalance, 0.0)};
   p.patches = s.patches;
   p.nodes = s.nodes;
   p.surfaces = s.surfaces;

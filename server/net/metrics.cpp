@@ -68,6 +68,7 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.family("energy_lumens", "gauge", "Where the light went.");
   text.sample("energy_lumens", status.energy.emitted, "{part=\"emitted\"}");
   text.sample("energy_lumens", status.energy.absorbed, "{part=\"absorbed\"}");
+  text.sample("energy_lumens", status.energy.specular, "{part=\"specular\"}");
   text.sample("energy_lumens", status.energy.escaped, "{part=\"escaped\"}");
   text.sample("energy_lumens", status.energy.backface, "{part=\"backface\"}");
   text.sample("energy_lumens", status.energy.unshot, "{part=\"unshot\"}");

@@ -63,6 +63,9 @@ void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
     for (const auto& colour : triangle.colours) hash.add(glm::dvec3(colour)), hash.add(colour.w);
     hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff),
         hash.add(triangle.transmission);
+    const auto& mirror = triangle.mirror;
+    hash.add(mirror.metallic), hash.add(mirror.colour), hash.add(mirror.coat), hash.add(mirror.roughness);
+    hash.add(mirror.attenuation);
   }
 }
 

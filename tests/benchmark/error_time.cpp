@@ -63,7 +63,7 @@ std::vector<fs::path> chosenScenes(const Options& options) {
     }
     return chosen;
   }
-  for (const auto* name : {"cornell", "room_small", "furnace_90"})
+  for (const auto* name : {"cornell", "room_small", "room_small_mirror", "furnace_90"})
     chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
   if (!options.full) return chosen;
   for (const auto* name : {"room_seminar", "furnace", "cornell_double", "room_small_double", "room_seminar_double"})

@@ -276,6 +276,7 @@ class Reader {
     triangle.alpha = values.alpha;
     triangle.cutoff = values.cutoff;
     triangle.transmission = values.transmission;
+    triangle.mirror = values.mirror;
     return triangle;
   }
 

@@ -64,6 +64,9 @@ class MaterialReader {
     values.base_colour = textureUse(pbr, "baseColorTexture");
     values.metal = textureUse(pbr, "metallicRoughnessTexture");
     values.metallic = pbr.value("metallicFactor", 1.0);
+    values.mirror.metallic = values.metallic;
+    values.mirror.colour = values.reflectance;
+    values.mirror.roughness = pbr.value("roughnessFactor", 1.0);
     if (values.metal.texture >= 0) return;
     values.reflectance *= 1.0 - values.metallic;
     values.metallic = 0.0;
@@ -94,9 +97,15 @@ class MaterialReader {
     if (mode == "MASK") values.cutoff = material.value("alphaCutoff", 0.5);
     if (const auto transmission = extensionOf(material, "KHR_materials_transmission"); transmission.is_object())
       values.transmission = transmission.value("transmissionFactor", 0.0);
-    values.see_through = mode != "OPAQUE" || values.transmission > 0.0;
-    // An opaque surface ignores the texture's alpha: only its transmission counts.
-    if (mode == "OPAQUE" && values.see_through) values.cutoff = 0.0;
+    values.see_through = mode != "OPAQUE";
+    if (extensionOf(material, "KHR_materials_pbrSpecularGlossiness").is_object()) return;
+    const auto ior = extensionOf(material, "KHR_materials_ior");
+    values.mirror.coat =
+        coatOf(ior.is_object() ? ior.value("ior", 1.5) : 1.5, values.mirror.roughness, values.transmission);
+    const auto volume = extensionOf(material, "KHR_materials_volume");
+    if (!volume.is_object() || !volume.contains("attenuationColor") || !volume.contains("attenuationDistance")) return;
+    const double thickness = volume.value("thicknessFactor", 0.0), distance = volume["attenuationDistance"];
+    values.mirror.attenuation = glm::pow(vector3(volume["attenuationColor"]), glm::dvec3(0.5 * thickness / distance));
   }
 
   /// None where the reference leads nowhere: as if it were not there.

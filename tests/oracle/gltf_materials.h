@@ -9,6 +9,7 @@
 
 #include "tests/oracle/gltf_file.h"
 #include "tests/oracle/texture.h"
+#include "tests/oracle/triangle_scene.h"
 
 namespace radiosity::oracle {
 
@@ -25,6 +26,7 @@ struct MaterialValues {
   bool double_sided = false;
   bool see_through = false;
   double alpha = 1.0, cutoff = -1.0, transmission = 0.0;
+  Mirror mirror;
   double metallic = 0.0;
   glm::dvec3 specular{0.0};
   MaterialTexture base_colour, emissive, metal, specular_texture;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "tests/oracle/burial.h"
 #include "tests/oracle/directions.h"
 #include "tests/oracle/lamps.h"
+#include "tests/oracle/mirrors.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/ray_scene.h"
 #include "tests/oracle/shading.h"
@@ -80,7 +82,12 @@ class PathTracer::Scene {
         sky_lower_(scene.sky_lower),
         sky_map_(scene.sky_map) {
     sky_map_.prepare();
-    for (const auto& triangle : triangles()) see_through_ = see_through_ || triangle.see_through;
+    for (const auto& triangle : triangles()) {
+      see_through_ = see_through_ || triangle.see_through;
+      if (!(triangle.mirror.metallic > 0.0 || triangle.mirror.coat > 0.0)) continue;
+      has_mirrors_ = true;
+      rough_mirrors_.try_emplace(triangle.mirror.roughness, triangle.mirror.roughness);
+    }
     gatherLights();
   }
 
@@ -295,13 +302,18 @@ class PathTracer::Scene {
       if (!sky_map_.empty()) sum += throughput * mapLight(at, random);
       const auto direction = cosineDirection(at.shading, u[3], u[4]);
       if (glm::dot(direction, at.normal) <= 0.0) return sum;  // into the surface itself
-      const auto hit = see_through_ ? traceThrough(at, direction, random) : trace(at, direction);
+      auto hit = see_through_ ? traceThrough(at, direction, random) : trace(at, direction);
       if (bounce == 0) count(hit, tally);
       // The colours of the sky are met by cosine rays only: pi times their radiance is the mean over them.
       if (!hit)
         return sum + throughput * (kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_) + mapByCosine(at, direction));
       if (isBlackBack(*hit)) return sum;
       sum += throughput * metByCosine(at, direction, *hit);
+      if (has_mirrors_) {
+        const auto sent = throughput;
+        sum += sent * alongMirrors(direction, hit, throughput, random);
+        if (!hit) return sum;
+      }
       throughput *= reflectanceAt(triangles()[hit->triangle], hit->point.position);
       const double survival = std::min(1.0, std::max({throughput.x, throughput.y, throughput.z}));
       if (survival <= 0.0) return sum;
@@ -311,6 +323,60 @@ class PathTracer::Scene {
       }
       at = hit->point;
     }
+  }
+
+  /// Goes on from what a ray met for as long as mirrors reflect it, or glass lets it through: then `hit` is what
+  /// scatters it, or none, and `throughput` is less by what was lost on the way. Returns what shines there, of one unit
+  /// of what `throughput` was.
+  [[nodiscard]] glm::dvec3 alongMirrors(glm::dvec3 direction, std::optional<Hit>& hit, glm::dvec3& throughput,
+                                        Random& random) const {
+    constexpr int kMostHops = 64;
+    glm::dvec3 part(1.0), sum(0.0);
+    for (int hop = 0; hop < kMostHops; ++hop) {
+      auto way = goOn(*hit, direction, part, random);
+      if (!way) {
+        throughput *= part;
+        return sum;
+      }
+      direction = *way;
+      const Point from{hit->point.position,
+                       glm::dot(direction, hit->point.normal) > 0.0 ? hit->point.normal : -hit->point.normal};
+      hit = see_through_ ? traceThrough(from, direction, random) : trace(from, direction);
+      if (!hit) {
+        sum += part * kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_);
+        if (!sky_map_.empty()) sum += part * kPi * sky_map_.radiance(direction);
+        return sum;
+      }
+      if (isBlackBack(*hit)) break;
+      sum += part * emissionAt(triangles()[hit->triangle], hit->point.position);
+    }
+    hit.reset();
+    return sum;
+  }
+
+  /// Where it goes from a mirror, or through glass; none: it is scattered. By chance, which `part` makes up for.
+  [[nodiscard]] std::optional<glm::dvec3> goOn(const Hit& hit, const glm::dvec3& direction, glm::dvec3& part,
+                                               Random& random) const {
+    const auto& triangle = triangles()[hit.triangle];
+    const auto [u, v] = Shading::weights(triangle, hit.point.position);
+    const auto facing = shading_.mirror(triangle, u, v);
+    if (!facing.any()) return std::nullopt;
+    const double cosine = -glm::dot(direction, hit.point.normal);
+    const auto usual = facing.at(cosine);
+    const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
+    if (random.uniform() < chance) {
+      part /= chance;
+      return reflect(hit.point.normal, direction, facing, rough_mirrors_.at(triangle.mirror.roughness), part, random);
+    }
+    part /= 1.0 - chance;
+    if (triangle.transmission <= 0.0) return std::nullopt;
+    const double passes = triangle.transmission * (1.0 - triangle.mirror.metallic);
+    if (random.uniform() >= passes) {
+      part /= 1.0 - triangle.transmission;  // which the reflectance has
+      return std::nullopt;
+    }
+    part *= shading_.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
+    return direction;
   }
 
   [[nodiscard]] bool isBlackBack(const Hit& hit) const { return hit.back && !triangles()[hit.triangle].double_sided; }
@@ -398,7 +464,8 @@ class PathTracer::Scene {
   std::vector<Lamp> lamps_;
   glm::dvec3 sky_upper_, sky_lower_;
   SkyMap sky_map_;
-  bool see_through_ = false;  // anything
+  bool see_through_ = false, has_mirrors_ = false;  // anything
+  std::map<double, RoughMirror> rough_mirrors_;     // by roughness
   std::vector<std::size_t> lights_;
   std::vector<double> cumulative_power_;
   std::vector<double> light_density_;  // by triangle; 0: does not shine

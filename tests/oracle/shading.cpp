@@ -41,7 +41,31 @@ glm::dvec3 Shading::reflectance(const Triangle& triangle, double u, double v) co
     const auto specular = triangle.specular * glm::dvec3(colour(triangle.specular_texture, u, v));
     result *= 1.0 - std::max({specular.x, specular.y, specular.z});
   }
-  return glm::clamp(result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+  // Below a coat arrives what that does not reflect: of light from all around 1/21 of the rest, beside what it reflects
+  // straight back.
+  const double coat = triangle.mirror.coat;
+  if (coat > 0.0) result *= (1.0 - coat) * (20.0 / 21.0);
+  return glm::clamp((1.0 - triangle.transmission) * result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+}
+
+glm::dvec3 Shading::Facing::at(double cosine) const {
+  return straight + (along - straight) * std::pow(std::clamp(1.0 - cosine, 0.0, 1.0), 5.0);
+}
+
+Shading::Facing Shading::mirror(const Triangle& triangle, double u, double v) const {
+  const auto& mirror = triangle.mirror;
+  double metal = mirror.metallic;
+  if (const auto* texture = textureOf(triangle.metal); texture != nullptr && metal > 0.0)
+    metal *= texture->value(between(triangle.metal.uv, u, v)).z;
+  Facing facing{metal * tint(triangle, u, v) / triangle.mirror.attenuation, metal};
+  if (mirror.coat > 0.0) facing = {facing.straight + (1.0 - metal) * mirror.coat, 1.0};
+  return facing;
+}
+
+glm::dvec3 Shading::tint(const Triangle& triangle, double u, double v) const {
+  auto colour_here = triangle.mirror.colour * glm::dvec3(colour(triangle.base_colour, u, v));
+  if (triangle.coloured) colour_here *= glm::dvec3(between(triangle.colours, u, v));
+  return colour_here * triangle.mirror.attenuation;
 }
 
 glm::dvec3 Shading::emission(const Triangle& triangle, double u, double v) const {
@@ -53,7 +77,7 @@ double Shading::opacity(const Triangle& triangle, double u, double v) const {
   double alpha = triangle.alpha * colour(triangle.base_colour, u, v).w;
   if (triangle.coloured) alpha *= between(triangle.colours, u, v).w;
   if (triangle.cutoff >= 0.0) alpha = alpha >= triangle.cutoff ? 1.0 : 0.0;
-  return alpha * (1.0 - triangle.transmission);
+  return alpha;
 }
 
 glm::dvec3 Shading::meanEmission(const Triangle& triangle) const {

@@ -25,6 +25,17 @@ class Shading {
 
   [[nodiscard]] glm::dvec3 reflectance(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] glm::dvec3 emission(const Triangle& triangle, double u, double v) const;  ///< lux
+  /// What it reflects as a mirror, of light straight at it and of light along it.
+  struct Facing {
+    glm::dvec3 straight{0.0};
+    double along = 0.0;
+    [[nodiscard]] bool any() const { return along > 0.0 || straight != glm::dvec3(0.0); }
+    /// Schlick 1994.
+    [[nodiscard]] glm::dvec3 at(double cosine) const;
+  };
+  [[nodiscard]] Facing mirror(const Triangle& triangle, double u, double v) const;
+  /// Of light that goes on through a face of glass.
+  [[nodiscard]] glm::dvec3 tint(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] double opacity(const Triangle& triangle, double u, double v) const;
 
   /// Over the triangle, estimated at some places; above 0 where the triangle can shine at all.

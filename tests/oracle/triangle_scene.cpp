@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <map>
 #include <numbers>
@@ -9,6 +10,12 @@
 #include <utility>
 
 namespace radiosity::oracle {
+
+double coatOf(double ior, double roughness, double transmission) {
+  constexpr double kMostRough = 0.2;  // what is rougher counts as diffuse
+  if (roughness > kMostRough && transmission <= 0.0) return 0.0;
+  return std::pow((ior - 1.0) / (ior + 1.0), 2.0);
+}
 
 double area(const Triangle& triangle) {
   const auto& [a, b, c] = triangle.corners;
@@ -31,6 +38,12 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
         triangle.alpha = material.opacity;
         triangle.see_through = material.opacity < 1.0;
         triangle.double_sided = material.double_sided;
+        triangle.transmission = material.transmission;
+        triangle.mirror.metallic = material.metallic;
+        triangle.mirror.colour = material.reflectance;
+        triangle.mirror.roughness = material.roughness;
+        triangle.mirror.coat = coatOf(1.5, material.roughness, material.transmission);
+        triangle.reflectance *= 1.0 - material.metallic;
         triangle.node = node;
         triangle.material = polygon.material;
         result.triangles.push_back(triangle);
@@ -82,7 +95,9 @@ bool sameMaterial(const Triangle& a, const Triangle& b) {
          a.specular == b.specular && a.base_colour.texture == b.base_colour.texture &&
          a.emissive.texture == b.emissive.texture && a.metal.texture == b.metal.texture &&
          a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
-         a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission;
+         a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission &&
+         a.mirror.metallic == b.mirror.metallic && a.mirror.coat == b.mirror.coat &&
+         a.mirror.roughness == b.mirror.roughness;
 }
 
 }  // namespace

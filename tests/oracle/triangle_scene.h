@@ -37,6 +37,15 @@ struct TextureUse {
   std::array<glm::dvec2, 3> uv{};
 };
 
+/// What a surface reflects as a mirror does, or lets through as a thin sheet of glass does.
+struct Mirror {
+  double metallic = 0.0;        ///< as the file has it; `Triangle::metal` multiplies it by place
+  glm::dvec3 colour{0.0};       ///< of metal, and of what glass lets through; the base colour's texture multiplies it
+  double coat = 0.0;            ///< reflectance of the rest, of light straight at it
+  double roughness = 1.0;       ///< its square is the width of the slopes
+  glm::dvec3 attenuation{1.0};  ///< of light through a face of glass
+};
+
 struct Triangle {
   std::array<glm::dvec3, 3> corners{};  ///< metres, counter-clockwise = front
   glm::dvec3 normal{0.0};               ///< unit, front
@@ -58,6 +67,7 @@ struct Triangle {
   double alpha = 1.0;
   double cutoff = -1.0;  ///< alpha mask; below 0: blended
   double transmission = 0.0;
+  Mirror mirror;
   std::uint32_t node = 0, material = 0;
 };
 
@@ -73,6 +83,8 @@ struct TriangleScene {
 };
 
 [[nodiscard]] double area(const Triangle& triangle);
+/// Mirror::coat of what is no metal.
+[[nodiscard]] double coatOf(double ior, double roughness, double transmission);
 
 [[nodiscard]] TriangleScene triangulate(const test_scenes::TestScene& scene);
 

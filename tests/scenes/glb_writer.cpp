@@ -110,15 +110,17 @@ json materialJson(const Material& material) {
   json result{{"name", material.name},
               {"pbrMetallicRoughness",
                {{"baseColorFactor", json::array({rho.x, rho.y, rho.z, material.opacity})},
-                {"metallicFactor", 0.0},
-                {"roughnessFactor", 1.0}}}};
+                {"metallicFactor", material.metallic},
+                {"roughnessFactor", material.roughness}}}};
   if (material.opacity < 1.0) result["alphaMode"] = "BLEND";
   if (material.double_sided) result["doubleSided"] = true;
+  if (material.transmission > 0.0)
+    result["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", material.transmission}};
   const auto& emission = material.emission_nits;
   const double strength = std::max({emission.x, emission.y, emission.z});
   if (strength <= 0.0) return result;
   result["emissiveFactor"] = toJson(emission / strength);
-  result["extensions"] = {{"KHR_materials_emissive_strength", {{"emissiveStrength", strength}}}};
+  result["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", strength}};
   return result;
 }
 

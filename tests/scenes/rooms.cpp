@@ -175,6 +175,20 @@ TestScene smoothRoom() {
   return scene;
 }
 
+/// The small room with a mirror for one wall, and legs of chairs and tables of metal.
+TestScene mirrorRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_mirror";
+  for (auto& material : scene.materials) {
+    const bool is_wall = material.name == "red_wall";
+    if (!is_wall && material.name != "metal") continue;
+    material.metallic = 1.0;
+    material.reflectance = glm::dvec3(is_wall ? 0.9 : 0.6);
+    material.roughness = is_wall ? 0.0 : 0.3;
+  }
+  return scene;
+}
+
 TestScene doubleSidedTwin(TestScene scene) {
   scene.name += "_double";
   for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
@@ -194,6 +208,7 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
              return concentricSpheres({0.5, 0.5, 1.0}, {1.0, 0.6, 0.0});
            }},
           {"room_small", smallRoom},
+          {"room_small_mirror", mirrorRoom},
           {"room_seminar", seminarRoom},
           {"room_lights", lightsRoom},
           {"room_area", areaRoom},

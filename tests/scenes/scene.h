@@ -15,6 +15,8 @@ struct Material {
   glm::dvec3 emission_nits{0.0};  ///< luminance of the front side
   double opacity = 1.0;           ///< below 1: alphaMode BLEND
   bool double_sided = false;
+  double metallic = 0.0, roughness = 1.0;
+  double transmission = 0.0;  ///< above 0: glass, of which `reflectance` is the tint
 };
 
 /// Convex, planar, counter-clockwise seen from the side that reflects and emits.

@@ -24,7 +24,7 @@ constexpr std::size_t kMostNamed = 20, kMostSurfaces = 3;
 /// Lamps whose rays are followed after a solve: while they are, no edit is done, and 14,000 take 2 s.
 constexpr std::size_t kMostAsked = 1'000;
 /// Of the light that is sent: more on backs is told of. What does not arrive anywhere but for rounding.
-constexpr double kMuchOnBacks = 0.05, kNothing = 1e-12;
+constexpr double kMuchOnBacks = 0.05, kMuchInMirrors = 0.002, kNothing = 1e-12;
 /// Chance may make a lamp's light look stronger than what is lost, of which it is a part.
 constexpr double kMargin = 1.1;
 constexpr const char* kOnSingle = "on backs of single-sided faces";
@@ -230,6 +230,17 @@ std::string lightName(const LitParts& parts, std::size_t number) {
   return fmt::format("{} light {}", kind, nodeName(parts.document, nodes[number]));
 }
 
+/// What lamps that are no surfaces send at mirrors.
+void tellMirrors(const solver::Solver& solver, double emitted, std::vector<std::string>& warnings) {
+  const double missing = solver.missingInMirrors();
+  if (!(missing > kMuchInMirrors * emitted)) return;
+  warnings.push_back(
+      fmt::format("{:.1f} % of all light is missing: what mirrors and metal reflect straight from point, "
+                  "spot, area and directional lights, suns and bright skies; emissive surfaces instead "
+                  "of lights have no such gap",
+                  100.0 * missing / emitted));
+}
+
 }  // namespace
 
 void LightReport::findDark(const LitParts& parts) {
@@ -251,6 +262,7 @@ void LightReport::findDark(const LitParts& parts) {
 void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
   lost_.clear();
   const auto energy = solver.energy();
+  tellMirrors(solver, channelSum(energy.emitted), lost_);
   const double emitted = channelSum(energy.emitted), on_backs = channelSum(energy.backface);
   const double lost = std::max(0.0, channelSum(energy.escaped)) + std::max(0.0, on_backs);
   if (!(lost > kNothing * emitted)) return;

@@ -78,7 +78,8 @@ Result<PictureParts> readPicture(LitScene& lit, const SnapshotRequest& request) 
   auto camera = chooseCamera(lit.scene(), request.camera);
   if (!camera) return tl::unexpected<Error>(camera.error());
   const auto quantity = found->second.pages;
-  PictureParts parts{lit.sharedScene(), lit.sharedPatches(), lit.sky(), *camera, {}, std::nullopt, std::nullopt};
+  PictureParts parts{lit.sharedScene(), lit.sharedPatches(), lit.sky(),   *camera, {},
+                     std::nullopt,      std::nullopt,        std::nullopt};
   // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
   const bool dark = quantity == Quantity::kIrradiance && lit.solver().error().total > kPresentable;
   if (dark && !lit.showsOwnLight()) {
@@ -86,6 +87,8 @@ Result<PictureParts> readPicture(LitScene& lit, const SnapshotRequest& request) 
     parts.faded = lit.shownPages();
   } else {
     parts.values = readQuantity(lit, quantity);
+    if (found->second.view == gpu::ViewQuantity::kLit && lit.materials().specular.sideCount() > 0)
+      parts.mirrors = MirrorScene{parts.patches, lit.materials(), lit.solver().irradiance(), lit.sky()};
   }
   if (!*camera && (quantity != Quantity::kIrradiance || parts.faded))
     parts.light = readQuantity(lit, Quantity::kIrradiance);
@@ -106,6 +109,7 @@ Result<Snapshot> makePicture(std::unique_ptr<gpu::ViewRenderer>& renderer, Pictu
   view.quantity = quantity.view;
   auto picture = draw(renderer, parts, pages, view);
   if (!picture) return tl::unexpected<Error>(picture.error());
+  if (parts.mirrors) addMirrors(*picture, view.camera, *parts.mirrors);
   // By the surfaces alone: a sky behind a small window is brighter than all of the room.
   std::optional<float> of_surfaces;
   if (quantity.photometric && !request.exposure) of_surfaces = exposureOf(picture->image);

@@ -9,6 +9,7 @@
 #include "common/result.h"
 #include "server/engine/engine.h"
 #include "server/engine/lit/lit_scene.h"
+#include "server/engine/publish/mirror_view.h"
 #include "server/engine/publish/quantity_pages.h"
 #include "server/gpu/picture/view_renderer.h"
 #include "server/scene/values/scene.h"
@@ -23,6 +24,7 @@ struct PictureParts {
   std::optional<scene::Camera> camera;                    ///< none: one is to be found that frames the scene
   QuantityValues values;                                  ///< of what the picture shows
   std::optional<std::vector<scene::LightmapPage>> faded;  ///< in the place of `values`: light from before an edit
+  std::optional<MirrorScene> mirrors;                     ///< where the picture shows some
   std::optional<QuantityValues> light;                    ///< for finding a camera, where `values` are not irradiance
 };
 

@@ -90,8 +90,9 @@ Status reportStatus(const LitScene& lit, double seconds) {
     status.seconds_left = seconds * (error.total * error.total / (target * target) - 1.0);
   const auto energy = solver.energy();
   const double scale = patches.scale;
-  status.energy = {lumens(energy.emitted, scale),  lumens(energy.absorbed, scale), lumens(energy.escaped, scale),
-                   lumens(energy.backface, scale), lumens(energy.unshot, scale),   lumens(energy.imbalance, scale)};
+  status.energy = {lumens(energy.emitted, scale),  lumens(energy.absorbed, scale), lumens(energy.specular, scale),
+                   lumens(energy.escaped, scale),  lumens(energy.backface, scale), lumens(energy.unshot, scale),
+                   lumens(energy.imbalance, scale)};
   status.nodes = patches.nodeCount();
   status.surfaces = patches.surfaces.size();
   status.polygons = patches.polygons;

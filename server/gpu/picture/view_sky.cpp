@@ -31,6 +31,10 @@ glm::vec3 beyond(const scene::Sky& sky, const glm::dvec3& direction) {
 
 }  // namespace
 
+glm::vec3 skyRadiance(const scene::Sky& sky, const glm::dvec3& direction) {
+  return (direction.y > 0.0 ? sky.upper : sky.lower) + beyond(sky, direction);
+}
+
 void addSky(ViewPicture& picture, const scene::Camera& camera, const scene::Sky& sky) {
   const int width = picture.image.width, height = picture.image.height;
   const auto half = halfView(camera, width, height);

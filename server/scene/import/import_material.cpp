@@ -89,21 +89,30 @@ class MaterialImporter {
     const auto* base = "/pbrMetallicRoughness/baseColorTexture";
     if (auto ok = readTexture(json, base, Coding::kSrgb, out.base_color_texture); !ok) return ok;
     out.metallic = unit(source.pbrMetallicRoughness.metallicFactor);
-    if (out.metallic == 0.0F) return {};
+    out.roughness = clampedRoughness(source.pbrMetallicRoughness.roughnessFactor);
     const auto* member = "/pbrMetallicRoughness/metallicRoughnessTexture";
+    if (out.metallic == 0.0F) return {};  // a picture is not read for the roughness of a coat alone
     if (auto ok = readTexture(json, member, Coding::kLinear, out.metallic_texture); !ok) return ok;
     foldMetallic(out);
-    if (out.metallic >= 0.999F && out.metallic_texture.texture == kNone) {
-      context_.warn(pointer_, "'" + source.name + "' is wholly metallic and so reflects nothing diffusely");
-    }
     return {};
   }
 
-  /// Most textures say the same of all the surface, and need not be kept.
+  float clampedRoughness(double factor) {
+    if (factor < 0.0 || factor > 1.0)
+      context_.warn(pointer_ + "/pbrMetallicRoughness/roughnessFactor", "is not between 0 and 1 and was clamped");
+    return unit(factor);
+  }
+
+  /// Most textures say the same of all the surface, and need not be kept. What is no metal anywhere has one roughness.
   void foldMetallic(Material& out) {
-    if (!uniform_blue_) return;
-    out.metallic *= *uniform_blue_;
-    out.metallic_texture = {};
+    if (!data_) return;
+    if (data_->blue) out.metallic *= *data_->blue;
+    if (out.metallic_texture.texture != kNone && out.metallic > 0.0F) {
+      out.roughness_texture = out.metallic_texture;
+    } else {
+      out.roughness *= data_->mean_green;
+    }
+    if (data_->blue) out.metallic_texture = {};
   }
 
   /// KHR_materials_pbrSpecularGlossiness, which comes before pbrMetallicRoughness where a material has both.
@@ -116,26 +125,52 @@ class MaterialImporter {
       out.specular[static_cast<int>(c)] = factor("specularFactor", c);
     }
     out.alpha = factor("diffuseFactor", 3);
+    out.roughness = 1.0F - unit(extension.value("glossinessFactor", 1.0));
     const std::string prefix = std::string("/extensions/") + kSpecularGlossiness;
     if (auto ok = readTexture(material, prefix + "/diffuseTexture", Coding::kSrgb, out.base_color_texture); !ok)
       return ok;
     if (out.specular == glm::vec3(0.0F)) return {};
     const auto texture = prefix + "/specularGlossinessTexture";
     if (auto ok = readTexture(material, texture, Coding::kSrgb, out.specular_texture); !ok) return ok;
-    const bool mirror = std::max({out.specular.r, out.specular.g, out.specular.b}) >= 0.999F;
-    if (mirror && out.specular_texture.texture == kNone) {
-      context_.warn(pointer_, "'" + out.name + "' is wholly specular and so reflects nothing diffusely");
-    }
     return {};
   }
 
+  float clampedIor(double ior) {
+    constexpr double kMostIor = 10.0;  // Fresnel's equations know no end, and nothing transparent has a tenth of that
+    if (ior < 1.0 || ior > kMostIor)
+      context_.warn(pointer_ + "/extensions/KHR_materials_ior/ior", "is not between 1 and 10 and was clamped");
+    return static_cast<float>(std::clamp(ior, 1.0, kMostIor));
+  }
+
+  /// By Beer's law, over the thickness that the file states.
+  glm::vec3 attenuationOf(const Json& volume) {
+    const auto where = pointer_ + "/extensions/KHR_materials_volume/";
+    const double thickness = volume.value("thicknessFactor", 0.0);
+    if (thickness < 0.0) context_.warn(where + "thicknessFactor", "is negative and was taken for 0");
+    if (!volume.contains("attenuationDistance") || !volume.contains("attenuationColor")) return glm::vec3(1.0F);
+    const double distance = volume["attenuationDistance"].get<double>();
+    if (!(distance > 0.0)) {
+      context_.warn(where + "attenuationDistance", "is not above 0; nothing is absorbed");
+      return glm::vec3(1.0F);
+    }
+    glm::vec3 left(1.0F);
+    for (int c = 0; c < 3; ++c) {
+      const auto colour = unit(volume["attenuationColor"][static_cast<std::size_t>(c)].get<double>());
+      left[c] = std::pow(colour, static_cast<float>(std::max(thickness, 0.0) / distance));
+    }
+    return left;
+  }
+
   void readOthers(const Json& json, Material& out) {
+    if (const auto* ior = extensionOf(json, "KHR_materials_ior")) out.ior = clampedIor(ior->value("ior", 1.5));
     if (const auto* transmission = extensionOf(json, "KHR_materials_transmission")) {
       out.transmission = unit(transmission->value("transmissionFactor", 0.0));
+      out.double_sided = out.double_sided || out.transmission > 0.0F;  // glass reflects on both sides of a face
       if (transmission->contains("transmissionTexture")) {
         context_.warn(pointer_, "transmissionTexture is ignored; the factor is used all over");
       }
     }
+    if (const auto* volume = extensionOf(json, "KHR_materials_volume")) out.attenuation = attenuationOf(*volume);
     if (extensionOf(json, "KHR_materials_unlit") != nullptr) {
       context_.warn(pointer_, "KHR_materials_unlit: lit like any other surface");
     }
@@ -155,7 +190,7 @@ class MaterialImporter {
   /// `member`: a JSON pointer into the material. Without such a texture, or with one that cannot be had, `use` stays as
   /// it is.
   Result<void> readTexture(const Json& material, const std::string& member, Coding coding, TextureUse& use) {
-    uniform_blue_.reset();
+    data_.reset();
     const Json::json_pointer pointer(member);
     if (!material.contains(pointer)) return {};
     const auto& info = material.at(pointer);
@@ -286,7 +321,7 @@ class MaterialImporter {
     return index;
   }
 
-  /// kNone where blue is the same all over: `uniform_blue_` then is that.
+  /// kNone where it tells nothing that `data_` does not.
   Result<std::uint32_t> dataTexture(std::size_t image) {
     auto found = data_textures_.find(image);
     if (found == data_textures_.end()) {
@@ -294,38 +329,53 @@ class MaterialImporter {
       if (!loaded) return tl::unexpected(loaded.error());
       found = data_textures_.emplace(image, *loaded).first;
     }
-    uniform_blue_ = found->second.blue;
+    data_ = found->second;
     return found->second.texture;
   }
 
   struct DataTexture {
     std::uint32_t texture = kNone;
     std::optional<float> blue;
+    float mean_green = 1.0F;
   };
 
   Result<DataTexture> loadData(std::size_t image) {
-    const auto* before = known(image);
-    auto data = before != nullptr ? before->data : nullptr;
-    auto blue = before != nullptr ? before->blue : std::nullopt;
-    if (!data && !blue) {
+    DecodedImage data;
+    if (const auto* before = known(image); before != nullptr) data = *before;
+    if (!data.data && !data.blue) {
       auto texture = decode(image, false);
       if (!texture) return tl::unexpected(texture.error());
-      blue = sameBlue(*texture);
-      if (!blue) data = std::make_shared<const Texture>(std::move(*texture));
+      data.blue = sameChannel(*texture, 2);
+      data.mean_green = meanGreen(*texture);
+      const bool is_metal = !data.blue || *data.blue > 0.0F;
+      if (is_metal && !(data.blue && sameChannel(*texture, 1)))
+        data.data = std::make_shared<const Texture>(std::move(*texture));
     }
     auto& kept = keep(image);
-    kept.data = data;
-    kept.blue = blue;
-    if (blue) return DataTexture{kNone, blue};
-    context_.scene.textures.push_back(std::move(data));
-    return DataTexture{static_cast<std::uint32_t>(context_.scene.textures.size() - 1), std::nullopt};
+    kept.data = data.data;
+    kept.blue = data.blue;
+    kept.mean_green = data.mean_green;
+    DataTexture found{kNone, data.blue, data.mean_green};
+    if (data.data) {
+      context_.scene.textures.push_back(std::move(data.data));
+      found.texture = static_cast<std::uint32_t>(context_.scene.textures.size() - 1);
+    }
+    return found;
   }
 
-  static std::optional<float> sameBlue(const Texture& texture) {
-    for (std::size_t i = 2; i < texture.rgba.size(); i += 4) {
-      if (texture.rgba[i] != texture.rgba[2]) return std::nullopt;
+  /// The value that all pixels have of a channel; none: they differ.
+  static std::optional<float> sameChannel(const Texture& texture, std::size_t channel) {
+    for (std::size_t i = channel; i < texture.rgba.size(); i += 4) {
+      if (texture.rgba[i] != texture.rgba[channel]) return std::nullopt;
     }
-    return texture.rgba.size() > 2 ? static_cast<float>(texture.rgba[2]) / 255.0F : 1.0F;
+    return texture.rgba.size() > channel ? static_cast<float>(texture.rgba[channel]) / 255.0F : 1.0F;
+  }
+
+  static float meanGreen(const Texture& texture) {
+    std::uint64_t sum = 0;
+    for (std::size_t i = 1; i < texture.rgba.size(); i += 4) sum += texture.rgba[i];
+    const auto pixels = texture.rgba.size() / 4;
+    return pixels > 0 ? static_cast<float>(static_cast<double>(sum) / (255.0 * static_cast<double>(pixels))) : 1.0F;
   }
 
   ImportContext& context_;
@@ -338,9 +388,9 @@ class MaterialImporter {
     bool srgb;
     Result<Texture> texture;
   };
-  std::optional<Ahead> ahead_;         ///< what nobody has asked for yet
-  std::optional<float> uniform_blue_;  ///< of the last data texture that was asked for
-  std::set<std::string> warned_;       ///< textures whose references were looked at
+  std::optional<Ahead> ahead_;       ///< what nobody has asked for yet
+  std::optional<DataTexture> data_;  ///< the last that was asked for
+  std::set<std::string> warned_;     ///< textures whose references were looked at
 };
 
 }  // namespace

@@ -20,8 +20,9 @@ namespace radiosity::scene {
 
 struct DecodedImage {
   SharedList<Texture>::Element color;  ///< sRGB; null: not asked for
-  SharedList<Texture>::Element data;   ///< linear; null: not asked for, or blue is the same all over
+  SharedList<Texture>::Element data;   ///< linear; null: not asked for, or of no use (see there)
   std::optional<float> blue;           ///< 0 to 1: that which is the same all over
+  float mean_green = 1.0F;             ///< 0 to 1, of `data`, or of what it would be
   std::uint8_t halvings = 0;           ///< of width and height (ImagePlan)
 };
 /// By the bytes that they are decoded from, which so stay those of that image.

@@ -11,6 +11,7 @@
 #include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/geometry/triangle_rows.h"
+#include "server/scene/shading/specular.h"
 #include "server/scene/values/chart_corners.h"
 #include "server/scene/values/material_of.h"
 #include "server/scene/values/shade_texture.h"
@@ -148,8 +149,8 @@ class SurfaceOpacity {
   }
 
   [[nodiscard]] float opacityOf(const ChartCorners& c, const UvMap& uv, const glm::dvec2& cell) const {
-    const float transmitted = 1.0F - material_.transmission;
-    if (material_.alpha_mode == AlphaMode::kOpaque) return transmitted;
+    const float stopped = 1.0F - passedPart(material_);
+    if (material_.alpha_mode == AlphaMode::kOpaque) return stopped;
     const bool uniform = !texture_ && primitive_.color0.empty();
     const int side = uniform ? 1 : kSamples;
     float sum = 0.0F;
@@ -161,7 +162,7 @@ class SurfaceOpacity {
         sum += mask ? (alpha >= material_.alpha_cutoff ? 1.0F : 0.0F) : std::clamp(alpha, 0.0F, 1.0F);
       }
     }
-    return transmitted * sum / static_cast<float>(side * side);
+    return stopped * sum / static_cast<float>(side * side);
   }
 
   [[nodiscard]] std::uint8_t& cell(std::uint32_t x, std::uint32_t y) {
@@ -198,7 +199,7 @@ class SurfaceOpacity {
     }
     // Slivers that hold no cell's middle: as the surface would be without a texture.
     const float alpha = material_.alpha_mode == AlphaMode::kBlend ? material_.alpha : 1.0F;
-    return byteOf(alpha * (1.0F - material_.transmission));
+    return byteOf(alpha * (1.0F - passedPart(material_)));
   }
 
   PatchScene& patches_;

@@ -10,8 +10,9 @@ namespace radiosity::scene {
 [[nodiscard]] bool isSeeThrough(const Material& material);
 
 /// Fills the opacity grids of surfaces one can see through (Surface::see_through): MASK gives the part of a cell above
-/// the cutoff, BLEND alpha, transmission 1 - factor; all of them multiplied. Grids together have at most 2^26 cells:
-/// beyond that they are coarser, with a warning. Needs vertices and triangle_source, too.
+/// the cutoff, BLEND alpha, transmission what a face does not let pass (specular.h); all of them multiplied. Grids
+/// together have at most 2^26 cells: beyond that they are coarser, with a warning. Needs vertices and triangle_source,
+/// too.
 void measureOpacity(const Scene& scene, PatchScene& patches);
 
 /// Multiplies the leaf areas of those surfaces by the opacity of the leaf; what is wholly cut out becomes empty.

@@ -14,6 +14,7 @@
 #include "server/geometry/triangle_rows.h"
 #include "server/scene/shading/shade.h"
 #include "server/scene/shading/shade_layers.h"
+#include "server/scene/shading/specular.h"
 #include "server/scene/values/chart_corners.h"
 #include "server/scene/values/material_of.h"
 #include "server/scene/values/patch_scene.h"
@@ -28,7 +29,7 @@ using Value = MaterialLayers::Value;
 
 /// Of a leaf's samples, by how much of the surface is there: the mean of what is everywhere the same is just that.
 struct Sum {
-  glm::dvec3 emission{0.0}, reflectance{0.0};
+  glm::dvec3 emission{0.0}, reflectance{0.0}, specular{0.0}, gloss{0.0};
   double weight = 0.0;
 };
 
@@ -53,10 +54,12 @@ class MaterialShader {
     shadeLeaves();
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
-      average(first);
       const auto side = out_.emission.sideOf(first);
-      out_.emission.assign(side, emission_);
-      out_.reflectance.assign(side, reflectance_);
+      assign(first, side, emission_, out_.emission);
+      assign(first, side, reflectance_, out_.reflectance);
+      if (out_.specular.sideCount() == 0) continue;
+      assign(first, side, specular_, out_.specular);
+      assign(first, side, gloss_, out_.gloss);
     }
   }
 
@@ -72,6 +75,7 @@ class MaterialShader {
         rho = kMaxReflectance;
       }
       if (!(rho > 0.0F)) rho = 0.0F;
+      if (!(value.specular[c] > 0.0F)) value.specular[c] = 0.0F;
       if (!(value.emission[c] > 0.0F) || !std::isfinite(value.emission[c])) value.emission[c] = 0.0F;
     }
     return value;
@@ -83,6 +87,9 @@ class MaterialShader {
       const auto side = out_.emission.sideOf(first);
       out_.emission.fill(side, value.emission);
       out_.reflectance.fill(side, value.reflectance);
+      if (out_.specular.sideCount() == 0) continue;
+      out_.specular.fill(side, value.specular);
+      out_.gloss.fill(side, value.gloss);
     }
   }
 
@@ -116,8 +123,7 @@ class MaterialShader {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
-    emission_.resize(nodes);
-    reflectance_.resize(nodes);
+    for (auto* values : {&emission_, &reflectance_, &specular_, &gloss_}) values->resize(nodes);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t) {
       interruptionPoint();
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
@@ -126,12 +132,16 @@ class MaterialShader {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;
       if (sums_[i].weight > 0.0) {
-        value = {sums_[i].emission / sums_[i].weight, sums_[i].reflectance / sums_[i].weight};
+        const auto& sum = sums_[i];
+        value = {sum.emission / sum.weight, sum.reflectance / sum.weight, 1.0F, sum.specular / sum.weight,
+                 sum.gloss / sum.weight};
       } else if (point.triangle != kNone) {
         value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
       }
       emission_[i] = value.emission;
       reflectance_[i] = value.reflectance;
+      specular_[i] = value.specular;
+      gloss_[i] = value.gloss;
     }
   }
 
@@ -157,31 +167,35 @@ class MaterialShader {
         const double weight = value.weight;
         sums_[leaf].emission += glm::dvec3(value.emission) * weight;
         sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
+        sums_[leaf].specular += glm::dvec3(value.specular) * weight;
+        sums_[leaf].gloss += glm::dvec3(value.gloss) * weight;
         sums_[leaf].weight += weight;
       }
     }
   }
 
+  void assign(std::uint32_t first, std::size_t side, std::vector<glm::vec3>& values, SideColours& colours) const {
+    average(first, values);
+    colours.assign(side, values);
+  }
+
   /// Of the levels above leaves, by what of them is there on the side that begins with node `first`.
-  void average(std::uint32_t first) {
+  void average(std::uint32_t first, std::vector<glm::vec3>& values) const {
     LevelGrid below = levelGrid(surface_.width, surface_.height, 0);
     for (std::uint32_t level = 1; level < surface_.level_count; ++level) {
       const LevelGrid grid = levelGrid(surface_.width, surface_.height, level);
       for (std::uint32_t y = 0; y < grid.height; ++y)
         for (std::uint32_t x = 0; x < grid.width; ++x) {
-          glm::dvec3 emission(0.0), reflectance(0.0);
+          glm::dvec3 sum(0.0);
           double weight = 0.0;
           for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, below.height); ++cy)
             for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, below.width); ++cx) {
               const std::uint32_t child = below.offset + cy * below.width + cx;
               const double area = patches_.node_area[first + child];
               weight += area;
-              emission += glm::dvec3(emission_[child]) * area;
-              reflectance += glm::dvec3(reflectance_[child]) * area;
+              sum += glm::dvec3(values[child]) * area;
             }
-          const std::uint32_t node = grid.offset + y * grid.width + x;
-          emission_[node] = weight > 0.0 ? glm::vec3(emission / weight) : glm::vec3(0.0F);
-          reflectance_[node] = weight > 0.0 ? glm::vec3(reflectance / weight) : glm::vec3(0.0F);
+          values[grid.offset + y * grid.width + x] = weight > 0.0 ? glm::vec3(sum / weight) : glm::vec3(0.0F);
         }
       below = grid;
     }
@@ -196,7 +210,7 @@ class MaterialShader {
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
-  std::vector<glm::vec3> emission_, reflectance_;  ///< by node of a side
+  std::vector<glm::vec3> emission_, reflectance_, specular_, gloss_;  ///< by node of a side
   bool was_clamped_ = false;
 };
 
@@ -204,9 +218,16 @@ class MaterialShader {
 
 namespace {
 
+/// Room for what reflects as mirrors do, once something does.
+void prepareSpecular(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& materials) {
+  if (materials.specular.sideCount() > 0 || !isSpecular(materialOf(scene, material))) return;
+  materials.specular = materials.gloss = SideColours(patches);
+}
+
 /// `surfaces`: those of the material, one at least.
 void shadeSurfaces(const Scene& scene, const PatchScene& patches, std::uint32_t material,
                    std::span<const std::uint32_t> surfaces, TexturePyramids& pyramids, PatchMaterials& materials) {
+  prepareSpecular(scene, patches, material, materials);
   MaterialShader shader(scene, patches, material, pyramids, materials);
   for (const std::uint32_t s : surfaces) shader.shade(s);
   if (shader.wasClamped())

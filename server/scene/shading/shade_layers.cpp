@@ -1,5 +1,7 @@
 #include "server/scene/shading/shade_layers.h"
 
+#include "server/scene/shading/specular.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -14,7 +16,9 @@ bool laidAlike(TextureUse a, const TextureUse& b) {
 
 MaterialLayers::MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids)
     : scene_(scene), material_(material) {
+  is_specular_ = isSpecular(material_);
   addSurface(pyramids);
+  if (is_specular_) addSpecularLooks(pyramids);
   if (material_.emission != glm::vec3(0.0F)) addEmissive(pyramids);
 }
 
@@ -65,6 +69,44 @@ void MaterialLayers::addSurface(TexturePyramids& pyramids) {
   }
   if (material_.alpha_mode != AlphaMode::kOpaque) setAlpha(base, stack);
   surface_.emplace(Layer{use, pyramids.of(stack)});
+}
+
+void MaterialLayers::addSpecularLooks(TexturePyramids& pyramids) {
+  const auto layerOf = [&](const TextureUse& use, bool is_used) {
+    const Texture* texture = is_used ? textureOf(use) : nullptr;
+    return texture != nullptr ? std::optional<Layer>({use, pyramids.of({.colour = texture})}) : std::nullopt;
+  };
+  const bool is_metal = material_.metallic > 0.0F;
+  specular_look_.base = layerOf(material_.base_color_texture, is_metal);
+  specular_look_.metal = layerOf(material_.metallic_texture, is_metal);
+  specular_look_.rough = layerOf(material_.roughness_texture, is_metal);
+  specular_look_.shine = layerOf(material_.specular_texture, material_.specular != glm::vec3(0.0F));
+}
+
+/// `value.reflectance`: what the surface would reflect diffusely without a coat. Of metal that is what the base colour
+/// has more, which holds also where both vary within the place.
+void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough,
+                                 Value& value) const {
+  value.gloss.x = std::clamp(material_.roughness * rough, 0.0F, 1.0F);
+  if (material_.specular != glm::vec3(0.0F)) {
+    value.specular = material_.specular * shine;
+    value.gloss.y = std::max({value.specular.r, value.specular.g, value.specular.b});
+    return;
+  }
+  metal *= material_.metallic;
+  if (metal > 0.0F) value.specular = glm::clamp(base - value.reflectance, 0.0F, 1.0F);
+  value.gloss.y = metal;
+  if (hasCoat(material_)) {
+    const float facing = facingReflectance(material_.ior);
+    value.specular += (1.0F - metal) * facing;
+    value.gloss.y = 1.0F;
+    value.reflectance *= 1.0F - meanReflectance(facing);
+  }
+  if (material_.transmission <= 0.0F) return;
+  // Rays that do not pass meet what is left: as parts of these. Along the surface none pass, and all are reflected.
+  const float stopped = std::max(1.0F - passedPart(material_), 1e-3F);
+  value.reflectance *= (1.0F - material_.transmission) / stopped;
+  value.specular = glm::min(value.specular / stopped, glm::vec3(1.0F));
 }
 
 void MaterialLayers::addEmissive(TexturePyramids& pyramids) {

@@ -17,6 +17,7 @@ class MaterialLayers {
   struct Value {
     glm::vec3 emission{0.0F}, reflectance{0.0F};
     float weight = 1.0F;  ///< how much of the surface is there: 0 where it is cut out, alpha where it is blended
+    glm::vec3 specular{0.0F}, gloss{0.0F};  ///< of PatchMaterials
   };
   /// Where a texture is looked up.
   struct Place {
@@ -26,7 +27,9 @@ class MaterialLayers {
   MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids);
 
   /// Without textures it is the same everywhere, but for vertex colours.
-  [[nodiscard]] bool hasTextures() const { return surface_ || metallic_ || specular_ || emissive_; }
+  [[nodiscard]] bool hasTextures() const {
+    return surface_ || metallic_ || specular_ || emissive_ || specular_look_.rough;
+  }
 
   /// `place(use)` gives the Place of a texture; `vertex` is COLOR_0 there.
   template <typename PlaceOf>
@@ -46,6 +49,14 @@ class MaterialLayers {
       value.reflectance *= found.rgb;
       value.weight *= found.coverage;
     }
+    if (is_specular_) {
+      const auto lookOr1 = [&](const std::optional<Layer>& layer) {
+        return layer ? look(*layer).rgb : glm::vec3(1.0F);
+      };
+      addSpecular(material_.base_color * glm::vec3(vertex) * lookOr1(specular_look_.base),
+                  lookOr1(specular_look_.metal).b, lookOr1(specular_look_.shine), lookOr1(specular_look_.rough).g,
+                  value);
+    }
     if (emissive_) value.emission *= look(*emissive_).rgb;
     return value;
   }
@@ -59,6 +70,8 @@ class MaterialLayers {
   [[nodiscard]] glm::vec3 diffuseOf(float metal, const glm::vec3& specular) const {
     return material_.base_color * (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
   }
+  void addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough, Value& value) const;
+  void addSpecularLooks(TexturePyramids& pyramids);
   [[nodiscard]] float weightOf(float vertex_alpha) const;
   [[nodiscard]] const Texture* textureOf(const TextureUse& use) const;
   void setAlpha(const Texture* alpha, PictureStack& stack) const;
@@ -72,6 +85,11 @@ class MaterialLayers {
   std::optional<Layer> surface_;
   bool metallic_inside_ = false, specular_inside_ = false;  ///< of `surface_`
   std::optional<Layer> metallic_, specular_, emissive_;     ///< by themselves
+  bool is_specular_ = false;
+  struct SpecularLook {
+    std::optional<Layer> base, metal, shine, rough;
+  };
+  SpecularLook specular_look_;  ///< of a material that is: each texture by itself
 };
 
 }  // namespace radiosity::scene

@@ -250,7 +250,10 @@ void joinBoxes(std::vector<ChangedBox>& boxes);
 /// Emission (exitance E = pi L_e, lm/m^2) and reflectance of every node (shadePatches).
 struct PatchMaterials {
   SideColours emission;
-  SideColours reflectance;
+  SideColours reflectance;  ///< diffuse
+  /// Where surfaces reflect as mirrors do (specular.h): by how much of what comes straight at them, and, of `gloss`, x
+  /// their roughness, y by how much at a grazing angle. No sides: nothing does.
+  SideColours specular, gloss;
   std::vector<std::string> warnings;
 };
 }  // namespace radiosity::scene

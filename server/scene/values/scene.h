@@ -52,15 +52,19 @@ struct Material {
   glm::vec3 base_color{1.0F};  ///< linear sRGB factor
   float alpha = 1.0F;
   float alpha_cutoff = 0.5F;
-  float metallic = 0.0F;      ///< reflectance = base_color x (1 - metallic) x (1 - the largest channel of specular)
-  glm::vec3 specular{0.0F};   ///< KHR_materials_pbrSpecularGlossiness, linear; 0 elsewhere
-  float transmission = 0.0F;  ///< KHR_materials_transmission factor
-  glm::vec3 emission{0.0F};   ///< L_e in nits: emissiveFactor x emissiveStrength
+  float metallic = 0.0F;        ///< reflectance = base_color x (1 - metallic) x (1 - the largest channel of specular)
+  glm::vec3 specular{0.0F};     ///< KHR_materials_pbrSpecularGlossiness, linear; 0 elsewhere
+  float roughness = 1.0F;       ///< GGX: its square is the width of the slopes of microfacets; 0: a perfect mirror
+  float ior = 1.5F;             ///< KHR_materials_ior; of what is no metal
+  float transmission = 0.0F;    ///< KHR_materials_transmission factor
+  glm::vec3 attenuation{1.0F};  ///< KHR_materials_volume: of light that passes its thickness, this part is left
+  glm::vec3 emission{0.0F};     ///< L_e in nits: emissiveFactor x emissiveStrength
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   bool double_sided = false;
   TextureUse base_color_texture, emissive_texture;
-  TextureUse metallic_texture;  ///< its blue channel multiplies `metallic`
-  TextureUse specular_texture;  ///< RGB multiplies `specular`
+  TextureUse metallic_texture;   ///< its blue channel multiplies `metallic`
+  TextureUse roughness_texture;  ///< its green channel multiplies `roughness`; of metal alone
+  TextureUse specular_texture;   ///< RGB multiplies `specular`
 
   bool operator==(const Material&) const = default;
 };

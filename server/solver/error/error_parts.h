@@ -14,10 +14,11 @@ struct ErrorParts {
   double discretization = 0.0;  ///< leaf against the bilinear interpolation of its parents, a third (second order)
 };
 
-/// Flux per channel, lux unit^2. emitted = absorbed + escaped + backface + unshot + imbalance. `unshot` can be below
-/// zero by chance: winners at roulette stand for more, or less, than there is.
+/// Flux per channel, lux unit^2. emitted = absorbed + specular + escaped + backface + unshot + imbalance. `specular`:
+/// what mirrors, metal and the leaves under smooth coats keep of their light; of all others it is `absorbed`. `unshot`
+/// can be below zero by chance: winners at roulette stand for more, or less, than there is.
 struct EnergyParts {
-  std::array<double, 3> emitted{}, absorbed{}, escaped{}, backface{}, unshot{};
+  std::array<double, 3> emitted{}, absorbed{}, specular{}, escaped{}, backface{}, unshot{};
   /// What unbiased sampling created or destroyed by chance (gathered light): zero in the mean.
   std::array<double, 3> imbalance{};
 };

@@ -175,6 +175,7 @@ void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, Fr
   for (auto& plane : planes) plane.assign(leaf_area_.size(), 0.0F);
   for (const auto& shooter : shooters_) {
     if (from == From::kLights && !shooter.isLight()) continue;
+    if (from == From::kSources && shooter.source == scene::kNone) continue;
     const glm::vec3 sent = static_cast<float>(shooter.carried(half)) * shooter.sent[half];
     if (sent == glm::vec3(0.0F)) continue;
     shooter.column[half].apply({sent.x, sent.y, sent.z}, {planes[0].data(), planes[1].data(), planes[2].data()});

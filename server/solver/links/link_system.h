@@ -121,8 +121,9 @@ class LinkSystem {
 
   /// No shooters are left.
   void clear();
-  /// Irradiance of every leaf value from the solution of `half`, or what of it comes straight from lights.
-  enum class From { kAll, kLights };
+  /// Irradiance of every leaf value from the solution of `half`, or what of it comes straight from lights, or from
+  /// those of them that are no surfaces.
+  enum class From { kAll, kLights, kSources };
   void irradiance(std::size_t half, std::vector<glm::vec3>& values, From from = From::kAll) const;
   /// What all links take.
   [[nodiscard]] std::size_t bytes() const;

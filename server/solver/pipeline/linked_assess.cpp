@@ -49,7 +49,7 @@ void LinkedSolver::assess() {
   }
   // Rays will bring what no shooter stands for, and what a wave that ended early did not measure.
   const auto sky = skyFlux();
-  if (!gathers()) owed += net_unshot_ + varying_ + planner_.unlinked(system_) + sky[0] + sky[1] + sky[2];
+  if (!gathers()) owed += inMirrors() + net_unshot_ + varying_ + planner_.unlinked(system_) + sky[0] + sky[1] + sky[2];
   if (field.square() <= 0.0) {
     const bool lacks = owed > 0.0 || (gathers() && gather_->bias() > 0.0);
     error_.residual = error_.total = lacks ? 1.0 : 0.0;  // all or nothing is missing
@@ -72,6 +72,26 @@ void LinkedSolver::assess() {
   error_.sampling = std::hypot(by_links_, std::sqrt((variation_.noise() + doubt) / field.square()));
   error_.variation = std::sqrt(variation_.left() / field.square());
   error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
+}
+
+/// Light that lamps may send by way of mirrors, which rays alone bring.
+double LinkedSolver::inMirrors() const {
+  double power = 0.0;
+  for (const auto& shooter : system_.shooters()) power += mirrors_ && shooter.isLight() ? shooter.power() : 0.0;
+  return power;
+}
+
+double LinkedSolver::missingInMirrors() const {
+  if (!mirrors_ || sources_.empty()) return 0.0;
+  std::vector<glm::vec3> light;
+  system_.irradiance(0, light, LinkSystem::From::kSources);
+  double flux = 0.0;
+  for (std::uint32_t value = 0; value < light.size(); ++value) {
+    if (!mirrors_->has(value)) continue;
+    const auto reflected = mirrors_->reflectance(value, 0.0F) * light[value];
+    flux += static_cast<double>(system_.leafAreas()[value] * channelSum(reflected));
+  }
+  return flux;
 }
 
 LinkedSolver::FieldSums LinkedSolver::assessField() const {
@@ -227,17 +247,19 @@ EnergyParts LinkedSolver::energy() const {
   for (const auto& side : sides_) {
     const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
     const auto emission = system_.emission().side(side.number), reflectance = system_.reflectance().side(side.number);
-    glm::dvec3 emitted(0.0), absorbed(0.0);
+    glm::dvec3 emitted(0.0), absorbed(0.0), specular(0.0);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
       emitted += area * glm::dvec3(emission[leaf]);
-      absorbed += area * (1.0 - glm::dvec3(reflectance[leaf])) * glm::dvec3(lightOf(side.first_value + leaf));
+      auto& of_leaf = mirrors_ && mirrors_->has(side.first_value + leaf) ? specular : absorbed;
+      of_leaf += area * (1.0 - glm::dvec3(reflectance[leaf])) * glm::dvec3(lightOf(side.first_value + leaf));
     }
     for (int c = 0; c < 3; ++c) {
       const auto i = static_cast<std::size_t>(c);
       parts.emitted[i] += emitted[c];
       parts.unshot[i] += net[c] + (side.gathered ? emitted[c] : 0.0);
       parts.absorbed[i] += absorbed[c];
+      parts.specular[i] += specular[c];
     }
   }
   const auto sky = skyFlux();
@@ -246,11 +268,13 @@ EnergyParts LinkedSolver::energy() const {
     if (gathers()) {
       parts.escaped[c] += gather_->escapedFlux()[c] + sky[c] - gather_->skyFlux()[c];
       parts.backface[c] += gather_->absorbedFlux()[c];
+      parts.specular[c] -= gather_->mirroredFlux()[c];
     } else {
       parts.unshot[c] += sky[c];
     }
     parts.unshot[c] -= sent_for[c];
-    parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
+    parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.specular[c] - parts.escaped[c] -
+                         parts.backface[c] - parts.unshot[c];
   }
   return parts;
 }

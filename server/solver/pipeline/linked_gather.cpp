@@ -132,7 +132,7 @@ std::vector<bool> LinkedSolver::lightOverLinks() const {
 }
 
 std::shared_ptr<const LeafRays> LinkedSolver::leafRays() {
-  if (!leaf_rays_) leaf_rays_ = std::make_shared<const LeafRays>(*patches_, sides_);
+  if (!leaf_rays_) leaf_rays_ = std::make_shared<const LeafRays>(*patches_, sides_, mirrors_.get());
   return leaf_rays_;
 }
 
@@ -140,6 +140,7 @@ void LinkedSolver::startRays() {
   gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays(),
                                          system_.leafAreas());
   gather_->shadeFor(&shaded_.shading());
+  gather_->reflectBy(mirrors_);
 }
 
 std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {
@@ -161,11 +162,22 @@ std::vector<glm::vec3> LinkedSolver::shiningOfLeaves() const {
   return emission;
 }
 
+/// Emission of what is.
+std::vector<glm::vec3> LinkedSolver::lampsOfLeaves() const {
+  auto emission = ofLeaves(system_.emission());
+  for (const auto& side : sides_) {
+    if (!side.gathered) std::fill_n(emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
+  }
+  return emission;
+}
+
 LeftLight LinkedSolver::leftLight() const {
   LeftLight light;
   light.residual = std::clamp(kResidual * settings_.target_error, kLeastResidual, kMostResidual);
   light.emission = shiningOfLeaves();
   light.reflectance = ofLeaves(system_.reflectance());
+  light.mirrors = mirrors_;
+  if (mirrors_) light.lamps = lampsOfLeaves();
   light.irradiance = over_links_;
   SkyLight sky(sky_);
   light.sky = sky.hemispheres;

@@ -85,6 +85,8 @@ void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
   system_.setMaterials(materials.emission, materials.reflectance);
+  mirrors_ = SpecularLeaves::find(sides_, materials);
+  if (gather_) gather_->reflectBy(mirrors_);
   takeLights();
   double area = 0.0;
   glm::dvec3 reflectance(0.0);

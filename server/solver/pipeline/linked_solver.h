@@ -74,6 +74,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
+  [[nodiscard]] double missingInMirrors() const override;
   [[nodiscard]] std::shared_ptr<const LeafRays> rays() override { return leafRays(); }
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
   [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
@@ -186,6 +187,7 @@ class LinkedSolver final : public Solver {
     double received = 0.0, reflected = 0.0;
   };
   [[nodiscard]] FieldSums assessField() const;
+  [[nodiscard]] double inMirrors() const;
   void updateVariation();
   [[nodiscard]] bool withLeafLight(const std::function<bool(const LeafLight&)>& work) const;
   [[nodiscard]] bool wantsVariation() const;
@@ -206,6 +208,7 @@ class LinkedSolver final : public Solver {
   /// By leaf value.
   [[nodiscard]] std::vector<glm::vec3> ofLeaves(const scene::SideColours& colours) const;
   [[nodiscard]] std::vector<glm::vec3> shiningOfLeaves() const;
+  [[nodiscard]] std::vector<glm::vec3> lampsOfLeaves() const;
   [[nodiscard]] LeftLight leftLight() const;
   [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
@@ -244,12 +247,13 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  std::shared_ptr<const LeafRays> leaf_rays_;  // of rays and paths; null: not asked for yet
-  std::unique_ptr<LeafGather> gather_;         // of reflected light; null: lights, and what is bright, are not measured
-  double sampled_alone_ = 0.0;  // error before the last round that brought samples and no rays; 0: none did
-  double sample_goal_ = 0.0;    // sampling error that further samples of links shall reach; 0: none
-  LinkParts parts_;             // views of these
-  EditRepair repair_;           // of links that an edit of geometry may have changed
+  std::shared_ptr<const LeafRays> leaf_rays_;      // of rays and paths; null: not asked for yet
+  std::shared_ptr<const SpecularLeaves> mirrors_;  // null: none
+  std::unique_ptr<LeafGather> gather_;  // of reflected light; null: lights, and what is bright, are not measured
+  double sampled_alone_ = 0.0;          // error before the last round that brought samples and no rays; 0: none did
+  double sample_goal_ = 0.0;            // sampling error that further samples of links shall reach; 0: none
+  LinkParts parts_;                     // views of these
+  EditRepair repair_;                   // of links that an edit of geometry may have changed
   KeyEnds key_ends_;
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;

@@ -179,6 +179,7 @@ void LeafGather::finish() {
   leaf_bias_ = smoother_->biasOfLeaves();
   weighLost();
   weighNoise();
+  weighMirrors();
   weighShading();
   smoother_->forget();
   weighMissed(levels);
@@ -206,6 +207,7 @@ void LeafGather::takeLight(std::size_t h) {
   half.source.assign(sights_.endCount(), {});
   half.radiosity.assign(sights_.endCount() + sights_.steps(h).size(), {});
   takeSky(h);
+  takeMirrors(h);
   half.arriving.assign(leaves, {});
   std::vector<SourceSum> sums(sides_.size());
   takeSources(h, sums);
@@ -257,6 +259,7 @@ void LeafGather::average(std::size_t half) {
 /// Where rays go on: what the leaf there has but for what comes by rays, and what the ray finds of that. `source`: null
 /// for none.
 void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source) {
+  if (light_.mirrors) return followMirrors(half, source);
   auto& radiosity = halves_[half].radiosity;
   auto to = radiosity.begin() + sights_.endCount();
   for (const auto& step : sights_.steps(half)) {
@@ -302,6 +305,7 @@ void LeafGather::weighNoise() {
       halves_[0].radiosity[v][c] = halves_[1].radiosity[v][c] = radiosity;
     }
   });
+  meanOfShot();
   std::array<LeafSmoother::Light, 2> arriving;
   inBothHalves([&](std::size_t half) {
     for (auto end = leaves; end < source.size(); ++end) halves_[half].radiosity[end] = rounded(source[end]);
@@ -364,9 +368,14 @@ glm::dvec3 LeafGather::doubtOf(std::size_t half, std::uint32_t end) const {
   glm::dvec3 part(1.0), sum(0.0);
   while (end >= sights_.endCount()) {
     const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    end = step.next;
+    if (SpecularStep::is(step.by)) {
+      const auto tint = tintOf(step);
+      part *= glm::dvec3(tint[0], tint[1], tint[2]);
+      continue;
+    }
     part *= glm::dvec3(light_.reflectance[step.by]);
     sum += kWithin * part * changeAcross(step.by);
-    end = step.next;
   }
   const auto& sent = halves_[half].radiosity[end];
   return sum + kUnsure * part * glm::abs(glm::dvec3(sent[0], sent[1], sent[2]));
@@ -397,15 +406,15 @@ glm::dvec3 LeafGather::changeAcross(std::uint32_t value) const {
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
   to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), sights_.partlyInside(), noise_, smoothed_,
-     bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_, unsolved_square_, leaf_bias_, block_light_,
-     side_noise_, side_light_);
+     bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, mirrored_flux_, unsolved_, unsolved_square_,
+     leaf_bias_, block_light_, side_noise_, side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
   std::vector<bool> partly_inside;
   from(has_gathered_, counts, partly_inside, noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_,
-       from_sky_, unsolved_, unsolved_square_, leaf_bias_, block_light_, side_noise_, side_light_);
+       from_sky_, mirrored_flux_, unsolved_, unsolved_square_, leaf_bias_, block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

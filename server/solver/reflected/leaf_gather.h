@@ -13,6 +13,9 @@
 // Solved by GMRES. What is sent and does not leave the scene arrives: of each part of the scene that sees nothing of
 // the others the level of x, which rays know to a thousandth or so, is the one that makes it so.
 //
+// Of a ray that a mirror reflected the leaf at the mirror counts by itself, and what is seen in it times what the
+// mirror reflects: there shooters count as well, since what they send over links does not come by way of mirrors.
+//
 // Two independent halves of the rays give two independent solutions; where their difference is worth
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
 #pragma once
@@ -41,11 +44,13 @@ namespace radiosity::solver {
 struct LeftLight {
   std::vector<glm::vec3> emission;  ///< of what is no light polygon
   std::vector<glm::vec3> reflectance;
-  std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
-  std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
-  std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
-  std::vector<glm::vec3> sky_cells;                  ///< the same by cell of SkyCells, to be added; empty: none
-  double residual = 4e-4;                            ///< that may be left, of all that is gathered
+  std::shared_ptr<const SpecularLeaves> mirrors = nullptr;  ///< as of LeafGather::reflectBy()
+  std::vector<glm::vec3> lamps;                             ///< emission of light polygons; empty: no mirror needs it
+  std::array<std::vector<glm::vec3>, 2> irradiance;         ///< over links, by half
+  std::array<std::vector<glm::vec3>, 2> shot;               ///< radiosity that shooters stand for, by half
+  std::array<glm::dvec3, 2> sky{};                          ///< pi times its radiance, above the horizon and below
+  std::vector<glm::vec3> sky_cells;                         ///< the same by cell of SkyCells, to be added; empty: none
+  double residual = 4e-4;                                   ///< that may be left, of all that is gathered
 };
 
 class LeafGather {
@@ -62,6 +67,8 @@ class LeafGather {
 
   /// What rays bring is told for these normals, too; null: for none. It is to outlive this.
   void shadeFor(const LeafShading* shading) { shading_ = shading; }
+  /// As LeafSights::reflectBy(), before light is brought that knows of them.
+  void reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) { sights_.reflectBy(std::move(mirrors)); }
   /// By number of LeafShading: what of irradiance(half) counts for the shading normal. Empty: there are none.
   [[nodiscard]] std::span<const glm::vec3> shadedParts(std::size_t half) const { return shaded_part_[half]; }
 
@@ -115,7 +122,9 @@ class LeafGather {
   /// Flux that leaves the scene, and that falls on unlit sides, by channel: of what leaves send.
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
-  /// Flux that comes straight from the sky.
+  /// Flux that mirrors reflect, each time that they do, but for what leaves the scene as it came from it.
+  [[nodiscard]] const std::array<double, 3>& mirroredFlux() const { return mirrored_flux_; }
+  /// Flux that comes straight from the sky, or by way of mirrors.
   [[nodiscard]] const std::array<double, 3>& skyFlux() const { return from_sky_; }
 
   /// Noise, as parts of the light where it is, that is borne, and that what is not is brought to.
@@ -159,7 +168,10 @@ class LeafGather {
     std::vector<Light> source;       ///< r; by what may be seen (LeafSights::endCount)
     std::vector<Light32> radiosity;  ///< r + rho x; and then by step
     std::vector<Light32> arriving;   ///< its means
-    std::vector<Light32> sky;        ///< by leaf: what its rays bring from cells of the sky; empty: none shines
+    /// By leaf: what its rays bring from the sky where its cells are told apart or mirrors show it; empty: they do not.
+    std::vector<Light32> sky;
+    std::vector<Light32> mirrored;  ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
+    std::vector<Light32> shot;      ///< by leaf, what only those in mirrors see: lamps, and what shooters send
     RayGmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
@@ -184,6 +196,23 @@ class LeafGather {
   [[nodiscard]] RayGmres::Vectors evenLight(std::size_t half, const std::vector<SourceSum>& sums) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
+  void followMirrors(std::size_t half, const std::vector<Light>* source);
+  [[nodiscard]] Light32 tintOf(const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 shotAt(std::size_t half, std::uint32_t end) const;
+  void takeMirrors(std::size_t half);
+  void takeMirroredSky(std::size_t half);
+  void meanOfShot();
+  void weighMirrors();
+  [[nodiscard]] Light mirroredAt(std::size_t half, std::size_t value) const {
+    if (halves_[half].mirrored.empty()) return {};
+    const auto& mirrored = halves_[half].mirrored[value];
+    return {mirrored[0], mirrored[1], mirrored[2], 0.0};
+  }
+  [[nodiscard]] Light shotOf(std::size_t half, std::size_t value) const {
+    if (halves_[half].shot.empty()) return {};
+    const auto& shot = halves_[half].shot[value];
+    return {shot[0], shot[1], shot[2], 0.0};
+  }
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels) noexcept;
   void takeSolutions();
@@ -303,7 +332,7 @@ class LeafGather {
   std::vector<double> block_light_;  ///< likewise, of all irradiance
   std::vector<double> side_noise_, side_light_;  ///< likewise, by side
   std::vector<float> leaf_bias_;
-  std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{};
+  std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{}, mirrored_flux_{};
 };
 
 }  // namespace radiosity::solver

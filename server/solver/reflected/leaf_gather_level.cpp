@@ -61,7 +61,7 @@ void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
         if (end < leaves) {  // most
           join(sights_.sideOf(end));
         } else if (end >= sights_.endCount()) {
-          join(sights_.sideOf(steps[end - sights_.endCount()].by));
+          join(sights_.sideOf(LeafSights::leafOf(steps[end - sights_.endCount()])));
           joinSteps(half, end, parts);
         } else {
           if (sights_.isAbsorbed(end)) {
@@ -83,8 +83,8 @@ void LeafGather::joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts
   while (end >= sights_.endCount()) {
     const auto& step = steps[end - sights_.endCount()];
     end = step.next;
-    const auto next = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
-    if (next < sights_.leafCount()) parts.join(sights_.sideOf(step.by), sights_.sideOf(next));
+    const auto next = end < sights_.endCount() ? end : LeafSights::leafOf(steps[end - sights_.endCount()]);
+    if (next < sights_.leafCount()) parts.join(sights_.sideOf(LeafSights::leafOf(step)), sights_.sideOf(next));
   }
 }
 
@@ -100,9 +100,9 @@ inline __attribute__((always_inline)) LeafGather::Light LeafGather::solved(std::
 inline __attribute__((always_inline)) LeafGather::Light LeafGather::skyAt(std::size_t h, std::size_t v,
                                                                           const Lost& lost) const {
   Light light{};
+  if (const auto& sky = halves_[h].sky; !sky.empty()) return {sky[v][0], sky[v][1], sky[v][2], 0.0};
   const auto above = static_cast<double>(lost.above), below = static_cast<double>(lost.below);
   if (above + below <= 0.0) return light;
-  if (const auto& sky = halves_[h].sky; !sky.empty()) return {sky[v][0], sky[v][1], sky[v][2], 0.0};
   for (std::size_t c = 0; c < 3; ++c)
     light[c] = above * light_.sky[0][static_cast<int>(c)] + below * light_.sky[1][static_cast<int>(c)];
   return light;
@@ -115,7 +115,8 @@ void LeafGather::visitParted(std::size_t h, std::span<const std::uint32_t> leave
   const auto steps = sights_.steps(h);
   std::vector<bool> is_parted(sights_.endCount() + steps.size());  // by end of a ray
   for (const auto v : leaves) is_parted[v] = true;
-  for (std::size_t i = 0; i < steps.size(); ++i) is_parted[sights_.endCount() + i] = is_parted[steps[i].by];
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    is_parted[sights_.endCount() + i] = is_parted[LeafSights::leafOf(steps[i])];
   for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
     for (const auto end : sights_.seen(h, v))
       if (is_parted[end]) visit(Arrival{v, end});
@@ -127,13 +128,16 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
   const auto& source = halves_[h].source;
   Light sent{}, part{1.0, 1.0, 1.0, 0.0};
   for (; end >= sights_.endCount(); end = sights_.steps(h)[end - sights_.endCount()].next) {
-    const auto by = sights_.steps(h)[end - sights_.endCount()].by;
+    const auto& step = sights_.steps(h)[end - sights_.endCount()];
+    if (SpecularStep::is(step.by)) break;
+    const auto by = step.by;
     const auto reflectance = lightOf(light_.reflectance[by]);
     for (std::size_t c = 0; c < 3; ++c) {
       sent[c] += part[c] * source[by][c];
       part[c] *= reflectance[c];
     }
   }
+  if (end >= sights_.endCount()) end = LeafSights::leafOf(sights_.steps(h)[end - sights_.endCount()]);  // of a mirror
   const bool is_leaf = end < sights_.leafCount();
   const auto x = is_leaf ? solved(h, end) : Light{};
   const auto reflectance = is_leaf ? lightOf(light_.reflectance[end]) : Light{};
@@ -142,7 +146,8 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
 }
 
 void LeafGather::addArrival(std::size_t h, const Arrival& ray, std::span<PartedFlux> fluxes) const {
-  const auto by = ray.end < sights_.endCount() ? ray.end : sights_.steps(h)[ray.end - sights_.endCount()].by;
+  const auto by =
+      ray.end < sights_.endCount() ? ray.end : LeafSights::leafOf(sights_.steps(h)[ray.end - sights_.endCount()]);
   const double share = areaOf(ray.value) / sights_.counts()[ray.value];
   auto& arrives = fluxes[part_[sights_.sideOf(by)]].arrives;
   const auto sent = sentFrom(h, ray.end);
@@ -234,12 +239,14 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
       const auto lost = lostOf(h, v);
       const auto sky = skyAt(h, v, lost);
       const double sends = 1.0 - lost.all();
+      const auto mirrored = mirroredAt(h, v), only_in_mirrors = shotOf(h, v);
       auto& source = halves_[h].source[v];
       for (std::size_t c = 0; c < 4; ++c) {
         source[c] = emission[c] + reflectance[c] * over_links[c] - shot[c];
-        sum.shining[c] += area * (std::abs(source[c]) + sky[c]);
-        sum.arrives[c] += area * (sends * source[c] + sky[c]);
-        sum.takes[c] += area * (1.0 - sends * reflectance[c]);
+        const double in_mirrors = mirrored[c] * only_in_mirrors[c];
+        sum.shining[c] += area * (std::abs(source[c]) + sky[c] + std::abs(in_mirrors));
+        sum.arrives[c] += area * ((sends + mirrored[c]) * source[c] + sky[c] + in_mirrors);
+        sum.takes[c] += area * (1.0 - (sends + mirrored[c]) * reflectance[c]);
       }
       sum.area += area;
     }
@@ -255,7 +262,7 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
 bool LeafGather::endsInLight(std::size_t half, std::uint32_t end, const std::vector<bool>& lit) const {
   const auto steps = sights_.steps(half);
   for (; end >= sights_.endCount(); end = steps[end - sights_.endCount()].next)
-    if (lit[sights_.sideOf(steps[end - sights_.endCount()].by)]) return true;
+    if (lit[sights_.sideOf(LeafSights::leafOf(steps[end - sights_.endCount()]))]) return true;
   if (end < sights_.leafCount()) return lit[sights_.sideOf(end)];
   return !sights_.isAbsorbed(end) && halves_[half].source[end] != Light{};
 }
@@ -269,7 +276,7 @@ std::vector<bool> LeafGather::litSides(std::size_t half) const {
       if (is_it(v)) return true;
     return false;
   };
-  const auto hasOwn = [&](std::uint32_t v) { return halves_[half].source[v] != Light{}; };
+  const auto hasOwn = [&](std::uint32_t v) { return halves_[half].source[v] != Light{} || shotOf(half, v) != Light{}; };
   const auto seesLight = [&](std::uint32_t v) {
     for (const auto end : sights_.seen(half, v))
       if (endsInLight(half, end, lit)) return true;
@@ -333,10 +340,11 @@ RADIOSITY_CLONES void LeafGather::addLevels(std::size_t h, std::span<LevelSum> s
       const auto lost = lostOf(h, v);
       const auto sky = skyAt(h, v, lost);
       const auto& loss = lossOf(h, v);
+      const auto mirrored = mirroredAt(h, v), only_in_mirrors = shotOf(h, v);
       for (std::size_t c = 0; c < 4; ++c) {
-        const double sends = 1.0 - loss[c] * lost.all();
+        const double sends = 1.0 - loss[c] * lost.all() + mirrored[c];
         const double stays = area * (1.0 - sends * reflectance[c]);
-        sum.left[c] += area * (sends * source[c] + sky[c]);
+        sum.left[c] += area * (sends * source[c] + sky[c] + mirrored[c] * only_in_mirrors[c]);
         sum.kept[c] += stays * x[c];
         sum.size[c] += stays * std::abs(x[c]);
         sum.all[c] += stays * (x[c] + over_links[c]);
@@ -407,7 +415,7 @@ void LeafGather::weighLost() {
   for (std::size_t half = 0; half < 2; ++half) {
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
       const auto lost = lostOf(half, v);
-      if (lost.all() <= 0.0) continue;
+      if (lost.all() <= 0.0 && halves_[half].sky.empty()) continue;
       const auto& loss = lossOf(half, v);
       const auto sky = skyAt(half, v, lost);
       for (std::size_t c = 0; c < 3; ++c) {

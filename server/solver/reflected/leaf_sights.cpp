@@ -9,6 +9,7 @@
 #include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/solver/math/halves.h"
+#include "server/solver/math/microfacets.h"
 #include "server/solver/rays/ray_order.h"
 
 namespace radiosity::solver {
@@ -127,31 +128,113 @@ std::uint64_t LeafSights::keyOf(std::uint32_t value, const Side& side, std::size
   return mixKeys(mixKeys(seed_, side.key), std::uint64_t{value - side.first_value} * 2 + half);
 }
 
-/// Its steps are made from the last to the first.
-std::uint32_t LeafSights::endOfRay(LeafRays::Place place, const glm::dvec3& direction, std::uint64_t key,
+/// Where a ray is, and the steps by which it came there.
+class LeafSights::Way {
+ public:
+  Way(const LeafSights& sights, const LeafRays::Place& place, const glm::dvec3& direction, std::uint64_t key)
+      : sights_(sights), place_(place), direction_(direction), key_(key) {}
+
+  void see(const geometry::Hit* first = nullptr) {
+    seen_ = sights_.rays_->see(place_, direction_, key_, there_, first);
+  }
+  [[nodiscard]] std::uint32_t seen() const { return seen_; }
+  [[nodiscard]] const LeafRays::Place& there() const { return there_; }
+
+  /// Whether it went on from where it was, and sees something else now.
+  [[nodiscard]] bool goOn() {
+    if (hops_ < SpecularLeaves::kMostHops && count_ + Reflection::kMostBounces <= kMostSteps &&
+        sights_.isMirror(seen_)) {
+      reflect();
+    } else if (count_ < kMostSteps && seen_ < sights_.leaf_count_ && seen_ == there_.value && sights_.isParted(seen_) &&
+               !sights_.isMirror(seen_)) {
+      scatter();
+    } else {
+      return false;
+    }
+    see();
+    return true;
+  }
+
+  /// From the last to the first; returns where the ray ends, or the number of the first.
+  [[nodiscard]] std::uint32_t takeSteps(std::uint32_t end, std::vector<Step>& steps) {
+    while (count_ > 0) {
+      steps.push_back({by_[--count_], end});
+      end = sights_.endCount() + static_cast<std::uint32_t>(steps.size() - 1);
+    }
+    return end;
+  }
+
+ private:
+  void scatter() {
+    by_[count_++] = seen_;
+    key_ = mixKeys(key_, count_);
+    const auto draw = sobol4(0, key_);
+    place_ = there_;
+    direction_ = cosineDirection(place_.normal, draw.x, draw.y);
+  }
+
+  void reflect() {
+    ++hops_;
+    const auto leaf = seen_;
+    key_ = mixKeys(key_, count_ + 1);
+    const auto reflection =
+        reflectByMicrofacets(there_.normal, direction_, sights_.mirrors_->roughness(leaf), mixKeys(key_, 1));
+    for (std::size_t i = 0; i < reflection.count; ++i) {
+      const auto level = SpecularStep::levelOf(reflection.edge[i], uniformFromKey(mixKeys(key_, 2 + i)));
+      by_[count_++] = SpecularStep{leaf, level, i > 0}.code();
+    }
+    place_ = there_;
+    direction_ = reflection.direction;
+  }
+
+  const LeafSights& sights_;
+  LeafRays::Place place_, there_;
+  glm::dvec3 direction_;
+  std::uint64_t key_;
+  std::uint32_t seen_ = LeafRays::kNothing;
+  std::array<std::uint32_t, kMostSteps> by_{};
+  std::size_t count_ = 0, hops_ = 0;
+};
+
+std::uint32_t LeafSights::endOfRay(const LeafRays::Place& place, const glm::dvec3& direction, std::uint64_t key,
                                    const geometry::Hit& first, std::vector<Step>& steps) const {
-  std::array<std::uint32_t, kMostSteps> by{};
-  std::size_t count = 0;
-  LeafRays::Place there;
-  auto seen = rays_->see(place, direction, key, there, &first);
-  const bool at_once = seen == LeafRays::kNothing && there.value == LeafRays::kNothing &&
-                       glm::distance(place.position, there.position) < rays_->widthOf(place.value);
-  while (goes_on_ && count < kMostSteps && seen < leaf_count_ && seen == there.value && isParted(seen)) {
-    by[count++] = seen;
-    key = mixKeys(key, count);
-    const auto draw = sobol4(0, key);
-    place = there;
-    seen = rays_->see(place, cosineDirection(place.normal, draw.x, draw.y), key, there);
+  Way way(*this, place, direction, key);
+  way.see(&first);
+  const bool at_once = way.seen() == LeafRays::kNothing && way.there().value == LeafRays::kNothing &&
+                       glm::distance(place.position, way.there().position) < rays_->widthOf(place.value);
+  while (goes_on_ && way.goOn()) continue;
+  const auto seen = way.seen();
+  const std::uint32_t end = LeafRays::isSky(seen)        ? skyEnd(seen - LeafRays::kSky)
+                            : at_once                    ? absorbedAtOnce()
+                            : seen == LeafRays::kNothing ? absorbed()
+                                                         : seen;
+  return way.takeSteps(end, steps);
+}
+
+/// Those that met a leaf that goes on otherwise now, or ended there.
+void LeafSights::reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) {
+  if (leaf_count_ >= SpecularStep::kMostLeaves) mirrors = nullptr;
+  std::vector<bool> differs;
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    if (SpecularLeaves::goOnAlike(mirrors.get(), value, mirrors_.get(), value)) continue;
+    differs.resize(endCount());
+    differs[value] = true;
   }
-  std::uint32_t end = LeafRays::isSky(seen)        ? skyEnd(seen - LeafRays::kSky)
-                      : at_once                    ? absorbedAtOnce()
-                      : seen == LeafRays::kNothing ? absorbed()
-                                                   : seen;
-  while (count > 0) {
-    steps.push_back({by[--count], end});
-    end = endCount() + static_cast<std::uint32_t>(steps.size() - 1);
-  }
-  return end;
+  mirrors_ = std::move(mirrors);
+  // Nobody could follow what is left of mirrors where there are none.
+  if (!differs.empty() && seen_[0].size() > 0) giveUpRays(differs, mirrors_ == nullptr);
+}
+
+/// Rays that end on these leaves, or pass them, are to be traced anew. `drops_steps`: even where few had steps.
+void LeafSights::giveUpRays(const std::vector<bool>& differs, bool drops_steps) {
+  if (isTraced()) before_ = count_;
+  slice_.reset();
+  cursor_ = 0;  // whatever happens, what is given up below is traced before anyone asks for it
+  inBothHalves([&](std::size_t half) { without_ray_[half] += giveUpRaysAt(differs, half); });
+  // To drop a few takes longer than to keep them.
+  const auto steps = steps_[0].size() + steps_[1].size();
+  const bool are_many = kFewSteps * (without_ray_[0] + without_ray_[1]) > steps;
+  if (are_many || drops_steps) layOut(std::vector(count_));
 }
 
 bool LeafSights::endsInDoubt(std::size_t half, std::uint32_t end) const {
@@ -305,17 +388,11 @@ std::vector<bool> LeafSights::findPartlyInside() const {
 void LeafSights::takePartlyInside() {
   auto found = findPartlyInside();
   if (found == partly_inside_) return;
-  slice_.reset();
-  cursor_ = 0;  // whatever happens, what is given up below is traced before anyone asks for it
   std::vector<bool> differs(endCount(), false);
   for (std::uint32_t value = 0; value < leaf_count_; ++value)
     differs[value] = (!found.empty() && found[value]) != (!partly_inside_.empty() && partly_inside_[value]);
-  inBothHalves([&](std::size_t half) { without_ray_[half] += giveUpRaysAt(differs, half); });
+  giveUpRays(differs, false);
   partly_inside_ = std::move(found);
-  before_ = count_;
-  // To drop a few takes longer than to keep them.
-  const auto steps = steps_[0].size() + steps_[1].size();
-  if (kFewSteps * (without_ray_[0] + without_ray_[1]) > steps) layOut(before_);
 }
 
 /// Those that end on such leaves, or go on from there. How many steps they had.
@@ -334,7 +411,7 @@ std::size_t LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_
     auto last = end;
     std::size_t count = 0;
     for (; last >= endCount(); last = steps_[half][last - endCount()].next, ++count)
-      passes = passes || leaves[steps_[half][last - endCount()].by];
+      passes = passes || leaves[leafOf(steps_[half][last - endCount()])];
     if (!passes && !leaves[last]) continue;
     seen.set(at, seen.most());
     steps += count;

@@ -6,6 +6,8 @@
 // day on one side and the night on the other, and the leaf's mean would bring each to the other. So rays that end on
 // such a leaf go on from where they end. So they do on leaves that lie in part within a wall of an open model: there
 // some rays end at once, on the backs of what bounds it. In closed pockets what leaks is kept for all bounces.
+//
+// Rays that meet a mirror, metal or a smooth coat go on as well, as the surface reflects them (SpecularLeaves).
 #pragma once
 
 #include <array>
@@ -20,6 +22,8 @@
 #include "server/solver/edits/shadows.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/rays/leaf_rays.h"
+#include "server/solver/rays/specular_leaves.h"
+#include "server/solver/reflected/specular_step.h"
 
 namespace radiosity::solver {
 
@@ -61,12 +65,19 @@ class LeafSights {
   [[nodiscard]] bool isParted(std::uint32_t value) const {
     return rays_->isCut(value) || (!partly_inside_.empty() && partly_inside_[value]);
   }
-  /// The ray reached a leaf that is parted, and what it saw from there. Later ones go on to earlier ones.
+  /// Leaves that reflect as mirrors do; null: none does. Rays that met, or now meet, others than before are to be
+  /// traced anew.
+  void reflectBy(std::shared_ptr<const SpecularLeaves> mirrors);
+  /// The ray reached a leaf that is parted, or a mirror, and what it saw from there. Later ones go on to earlier ones.
   struct Step {
-    std::uint32_t by;    ///< leaf value
+    std::uint32_t by;    ///< leaf value, or what SpecularStep says
     std::uint32_t next;  ///< an end, or the step before
   };
   [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
+  /// The leaf of a step.
+  [[nodiscard]] static std::uint32_t leafOf(const Step& step) {
+    return SpecularStep::is(step.by) ? SpecularStep::of(step.by).leaf : step.by;
+  }
   /// The ray went on as often as a ray may, or there is no memory for more of that, and ends on another leaf that is
   /// parted.
   [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const {
@@ -182,8 +193,13 @@ class LeafSights {
   void layOut(std::span<const std::uint16_t> counts);
   /// Returns how many rays.
   std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made);
-  [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, const glm::dvec3& direction, std::uint64_t key,
+  class Way;
+  [[nodiscard]] std::uint32_t endOfRay(const LeafRays::Place& place, const glm::dvec3& direction, std::uint64_t key,
                                        const geometry::Hit& first, std::vector<Step>& steps) const;
+  [[nodiscard]] bool isMirror(std::uint32_t value) const {
+    return mirrors_ && value < leaf_count_ && mirrors_->has(value);
+  }
+  void giveUpRays(const std::vector<bool>& differs, bool drops_steps);
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
   [[nodiscard]] Slice beginSlice();
   void traceSlice(Slice slice, Clock::time_point end);
@@ -231,6 +247,7 @@ class LeafSights {
 
   const std::vector<Side>& sides_;
   std::shared_ptr<const LeafRays> rays_;
+  std::shared_ptr<const SpecularLeaves> mirrors_;
   std::uint64_t seed_;
   std::uint32_t leaf_count_ = 0;
   std::uint32_t cursor_ = 0;                   ///< leaves below are traced

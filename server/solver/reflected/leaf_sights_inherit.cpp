@@ -35,13 +35,19 @@ std::uint32_t LeafSights::inheritStep(std::size_t half, std::uint32_t end, const
   const auto& former = from.former;
   const auto& step = former.steps_[half][end - former.endCount()];
   const bool is_last = step.next < former.endCount();
-  const auto then = is_last ? step.next : former.steps_[half][step.next - former.endCount()].by;
-  const auto by = from.value_after[step.by], to = from.value_after[then];
+  const auto then = is_last ? step.next : leafOf(former.steps_[half][step.next - former.endCount()]);
+  const auto by = from.value_after[leafOf(step)], to = from.value_after[then];
   if (by == kUntraced || to == kUntraced || to >= leaf_count_) return kUntraced;
   if (from.stands_in[by] || from.stands_in[to] || from.change.mayHide(by, to)) return kUntraced;
   const auto next = is_last ? to : inheritStep(half, step.next, from);
   if (next == kUntraced) return kUntraced;
-  steps_[half].push_back({by, next});
+  auto code = by;
+  if (SpecularStep::is(step.by)) {
+    auto mirror = SpecularStep::of(step.by);
+    mirror.leaf = by;
+    code = mirror.code();
+  }
+  steps_[half].push_back({code, next});
   return endCount() + static_cast<std::uint32_t>(steps_[half].size() - 1);
 }
 
@@ -86,7 +92,7 @@ void LeafSights::findFirstMet(std::size_t half, const PackedNumbers::Run& old, c
   std::size_t k = 0;
   for (const auto end : old) {
     const bool goes_on = end >= ends && end != untraced;
-    const auto by = goes_on ? former.steps_[half][end - ends].by : end;
+    const auto by = goes_on ? leafOf(former.steps_[half][end - ends]) : end;
     const auto after = end == untraced ? kUntraced : from.value_after[by];
     met.end[k] = after;
     met.leaf[k++] = after < leaf_count_ ? static_cast<std::int32_t>(after) : 0;
@@ -138,7 +144,8 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   for (std::uint32_t i = 0; i < skyCount(); ++i) value_after[former.firstOfSky() + i] = firstOfSky() + i;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     if (value_before[value] == scene::kNone) continue;
-    value_after[value_before[value]] = value;
+    if (SpecularLeaves::goOnAlike(mirrors_.get(), value, former.mirrors_.get(), value_before[value]))
+      value_after[value_before[value]] = value;
     if (former.count_[value_before[value]] > 0) counts[value] = std::min(most, former.count_[value_before[value]]);
   }
   forgetStandIns(former, value_after);

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "server/solver/lamps/unhidden.h"
+#include "server/solver/math/microfacets.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/rays/ray_order.h"
@@ -75,6 +76,13 @@ void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<
       if (!off_.empty()) off_[value] = 0.5F * reflectance_[value] * difference[side.first_node + leaf];
     }
   }
+  mirrors_ = SpecularLeaves::find(*sides_, solved.materials);
+  if (!mirrors_) return;
+  for (const auto& side : *sides_) {
+    const auto emission = solved.materials.emission.side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      lamp_emission_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
+  }
 }
 
 PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) const {
@@ -130,7 +138,8 @@ PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, 
       const auto of_ray = mixKeys(key, order[first + i].number);
       LeafRays::Place end;
       const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
-      sum.light += weight * leaving(value, end, of_ray, kMostSteps);
+      sum.light += weight * (leaving(value, end, of_ray, kMostSteps) +
+                             alongMirrors({value, end, direction[i], of_ray, kMostSteps}));
       if (!off_.empty() && value < off_.size()) sum.off += weight * glm::dvec3(off_[value]);
     }
   }
@@ -141,8 +150,29 @@ PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, 
 glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const {
   const auto draw = sobol4(0, key);
   LeafRays::Place end;
-  const auto value = rays_->see(spot.place, cosineDirection(spot.place.normal, draw.x, draw.y), key, end);
-  return leaving(value, end, key, steps);
+  const auto direction = cosineDirection(spot.place.normal, draw.x, draw.y);
+  const auto value = rays_->see(spot.place, direction, key, end);
+  return leaving(value, end, key, steps) + alongMirrors({value, end, direction, key, steps});
+}
+
+/// What a ray that met a mirror sees in it, beside the light of the mirror's own leaf. Lamps count in full there, since
+/// direct light does not come by way of mirrors.
+glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
+  glm::dvec3 sum(0.0), part(1.0);
+  auto [value, end, direction, key, steps] = met;
+  const auto isMirror = [&] { return mirrors_ && value < emission_.size() && mirrors_->has(value); };
+  for (std::size_t hop = 0; hop < SpecularLeaves::kMostHops && isMirror(); ++hop) {
+    key = mixKeys(key, 7 + hop);
+    const auto reflection = reflectByMicrofacets(end.normal, direction, mirrors_->roughness(value), key);
+    for (const double edge : reflection.edges())
+      part *= glm::dvec3(mirrors_->reflectance(value, static_cast<float>(edge)));
+    direction = reflection.direction;
+    const auto from = end;
+    value = rays_->see(from, direction, key, end);
+    sum += part * leaving(value, end, key, steps);
+    if (value < lamp_emission_.size()) sum += part * glm::dvec3(lamp_emission_[value]);
+  }
+  return sum;
 }
 
 /// Towards whoever sees it there: of a leaf that something cuts the light of that very place.

@@ -19,6 +19,7 @@
 #include "server/solver/lamps/sky_sources.h"
 #include "server/solver/patches/lights.h"
 #include "server/solver/rays/leaf_rays.h"
+#include "server/solver/rays/specular_leaves.h"
 
 namespace radiosity::solver {
 
@@ -84,6 +85,15 @@ class PlaceLight {
     glm::dvec3 light{0.0}, off{0.0};
   };
   [[nodiscard]] Gathered reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const;
+  /// What a ray met, which travelled along `direction`; `steps`: it goes on from leaves that something cuts so often.
+  struct Met {
+    std::uint32_t value;
+    LeafRays::Place end;
+    glm::dvec3 direction;
+    std::uint64_t key;
+    std::size_t steps;
+  };
+  [[nodiscard]] glm::dvec3 alongMirrors(const Met& met) const;
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
@@ -111,6 +121,8 @@ class PlaceLight {
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
   std::vector<glm::vec3> off_;  ///< what radiosity_ is off by; empty: not known
+  std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
+  std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
 };
 
 }  // namespace radiosity::solver

@@ -118,7 +118,7 @@ void expectSound(const Solve& solve) {
   });
   const auto e = solve.solver().energy();
   for (std::size_t c = 0; c < 3; ++c) {
-    const double sum = e.absorbed[c] + e.escaped[c] + e.backface[c] + e.unshot[c] + e.imbalance[c];
+    const double sum = e.absorbed[c] + e.specular[c] + e.escaped[c] + e.backface[c] + e.unshot[c] + e.imbalance[c];
     EXPECT_NEAR(sum, e.emitted[c], 1e-6 * e.emitted[c]);
   }
 }

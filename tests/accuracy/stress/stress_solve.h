@@ -75,8 +75,8 @@ struct FromConstant {
 /// Largest difference of any leaf and channel between two solves of the same patches, over the RMS irradiance.
 [[nodiscard]] double largestDifference(const Solve& a, const Solve& b, double scale_of_b = 1.0);
 
-/// Expects every irradiance finite and not negative, and emitted = absorbed + escaped + backface + unshot + imbalance
-/// to 1e-6 of what is emitted.
+/// Expects every irradiance finite and not negative, and emitted = absorbed + specular + escaped + backface + unshot +
+/// imbalance to 1e-6 of what is emitted.
 void expectSound(const Solve& solve);
 
 }  // namespace radiosity::accuracy

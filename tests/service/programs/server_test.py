@@ -224,7 +224,7 @@ class ServerTest(ServiceCase):
         async def body():
             session, status = await self.solved()
             energy = status["energy"]
-            lost = energy["absorbed"] + energy["escaped"] + energy["backface"] + energy["unshot"] + \
+            lost = energy["absorbed"] + energy["specular"] + energy["escaped"] + energy["backface"] + energy["unshot"] + \
                 energy["imbalance"]
             self.assertGreater(energy["emitted"], 0)
             self.assertAlmostEqual(lost / energy["emitted"], 1, delta=1e-5)

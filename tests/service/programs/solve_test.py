@@ -49,7 +49,7 @@ class SolveTest(ServiceCase):
         for name in ("seconds", "shots", "patches", "surfaces", "polygons", "revision"):
             self.assertIsInstance(report[name], (int, float), name)
         self.assertEqual(set(report["error"]), {"total", "p95", "texels", "residual", "sampling", "variation", "discretization"})
-        self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
+        self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "specular", "escaped", "backface", "unshot", "imbalance"})
         self.assertLessEqual(report["error"]["texels"], 0.05)
         self.assertGreater(report["patches"], 500)
         self.assertEqual(report["polygons"], 2)

@@ -32,7 +32,7 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
     EXPECT_TRUE(report.at(name).is_number()) << name;
   for (const auto* name : {"total", "texels", "residual", "sampling", "variation", "discretization"})
     EXPECT_TRUE(report.at("error").at(name).is_number()) << name;
-  for (const auto* name : {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
+  for (const auto* name : {"emitted", "absorbed", "specular", "escaped", "backface", "unshot", "imbalance"})
     EXPECT_TRUE(report.at("energy").at(name).is_number()) << name;
   EXPECT_EQ(report["error"]["total"], 0.018);
   EXPECT_EQ(report["energy"]["imbalance"], -0.5);

@@ -65,7 +65,8 @@ TEST_F(Lifecycle, EnergyIsAccountedForToTheLastLumen) {
   solve(lumpedCube(0.5));
   const auto energy = status().energy;
   EXPECT_NEAR(energy.emitted, 1.0, 1e-4);  // white: 1 lux x 1 m2
-  const double found = energy.absorbed + energy.escaped + energy.backface + energy.unshot + energy.imbalance;
+  const double found =
+      energy.absorbed + energy.specular + energy.escaped + energy.backface + energy.unshot + energy.imbalance;
   EXPECT_NEAR(found / energy.emitted, 1.0, 1e-5);
   EXPECT_FALSE(status().counters.contains("energy.imbalance"));
 }

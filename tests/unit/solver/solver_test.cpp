@@ -72,8 +72,8 @@ TYPED_TEST(AnySolver, EnergyBalanceClosesToAHundredThousandth) {
     EXPECT_NEAR(energy.emitted[c], 3.0, 1e-5);
     EXPECT_GT(energy.escaped[c], 0.1);
     EXPECT_LT(std::abs(energy.imbalance[c]), 0.05 * energy.emitted[c]) << "more than chance explains";
-    const double sum =
-        energy.absorbed[c] + energy.escaped[c] + energy.backface[c] + energy.unshot[c] + energy.imbalance[c];
+    const double sum = energy.absorbed[c] + energy.specular[c] + energy.escaped[c] + energy.backface[c] +
+                       energy.unshot[c] + energy.imbalance[c];
     EXPECT_NEAR(sum / energy.emitted[c], 1.0, 1e-5);  // irradiance and S are single precision
   }
 }

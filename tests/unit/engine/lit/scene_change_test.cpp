@@ -43,6 +43,8 @@ TEST(SceneChange, whatAMaterialReflectsChangesItsMaterialAlone) {
     EXPECT_TRUE(onlyNodesMoved(before, after));
   };
   expectMaterial([](scene::Material& m) { m.metallic = 0.5F; });
+  expectMaterial([](scene::Material& m) { m.roughness = 0.5F; });
+  expectMaterial([](scene::Material& m) { m.ior = 1.3F; });
   expectMaterial([](scene::Material& m) { m.specular = {0.5F, 0, 0}; });
   expectMaterial([](scene::Material& m) { m.metallic_texture.texture = 0; });
   expectMaterial([](scene::Material& m) { m.specular_texture.texture = 1; });

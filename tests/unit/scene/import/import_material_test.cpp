@@ -42,12 +42,12 @@ TEST(ImportMaterial, materialsCarryWhatLightNeeds) {
   EXPECT_THAT(builder.scene()->warnings, Contains(HasSubstr("/materials/0/emissiveFactor")));
 }
 
-TEST(ImportMaterial, metalIsGltfsDefaultAndIsNamed) {
+TEST(ImportMaterial, metalIsGltfsDefault) {
   GltfBuilder builder;
   builder.gltf["materials"] = Json::array({{{"name", "foil"}}});
   const auto scene = imported(builder);
   EXPECT_EQ(scene.materials.at(0).metallic, 1.0F);
-  EXPECT_THAT(scene.warnings, Contains(HasSubstr("'foil'")));
+  EXPECT_EQ(scene.materials.at(0).roughness, 1.0F);
 }
 
 TEST(ImportMaterial, aMeshWithoutMaterialIsWhiteAndVisible) {
@@ -136,6 +136,23 @@ TEST(ImportMaterial, aMetallicTextureThatIsTheSameAllOverIsPartOfTheFactor) {
   EXPECT_FLOAT_EQ(scene.materials[0].metallic, 0.1F);
   EXPECT_EQ(scene.materials[0].metallic_texture.texture, kNone);
   EXPECT_TRUE(scene.textures.empty());
+}
+
+TEST(ImportMaterial, whatIsOutOfRangeIsClampedAndItsPlaceNamed) {
+  GltfBuilder builder;
+  builder.gltf["materials"] = Json::array({{{"pbrMetallicRoughness", {{"roughnessFactor", 1.5}, {"metallicFactor", 0}}},
+                                            {"extensions", {{"KHR_materials_ior", {{"ior", 0}}}}}},
+                                           {{"pbrMetallicRoughness", {{"roughnessFactor", -3}}},
+                                            {"extensions", {{"KHR_materials_ior", {{"ior", 1.33}}}}}}});
+  const auto scene = imported(builder);
+  EXPECT_EQ(scene.materials.at(0).roughness, 1.0F);
+  EXPECT_EQ(scene.materials[0].ior, 1.0F);
+  EXPECT_EQ(scene.materials.at(1).roughness, 0.0F);
+  EXPECT_EQ(scene.materials[1].ior, 1.33F);
+  EXPECT_THAT(scene.warnings, testing::UnorderedElementsAre(
+                                  HasSubstr("/materials/0/pbrMetallicRoughness/roughnessFactor: is not between"),
+                                  HasSubstr("/materials/0/extensions/KHR_materials_ior/ior: is not between"),
+                                  HasSubstr("/materials/1/pbrMetallicRoughness/roughnessFactor: is not between")));
 }
 
 TEST(ImportMaterial, specularGlossinessComesBeforeMetallicRoughness) {

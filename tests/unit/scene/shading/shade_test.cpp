@@ -67,6 +67,57 @@ TEST(Shade, UniformMaterialFillsEveryNode) {
   EXPECT_TRUE(materials.warnings.empty());
 }
 
+/// Of a floor all of this.
+PatchMaterials shadedFloor(const Material& material, std::uint64_t texels = 100) {
+  Scene scene;
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), material);
+  return shadePatches(scene, build(scene, texels));
+}
+
+TEST(Shade, MetalReflectsItsBaseColourAsAMirror) {
+  Material material;
+  material.base_color = {0.9F, 0.6F, 0.3F};
+  material.metallic = 1.0F;
+  material.roughness = 0.4F;
+  const auto materials = shadedFloor(material);
+  ASSERT_GT(materials.specular.sideCount(), 0U);
+  EXPECT_EQ(materials.specular.side(0)[0], material.base_color);
+  EXPECT_EQ(materials.gloss.side(0)[0], glm::vec3(0.4F, 1.0F, 0.0F));
+  EXPECT_EQ(materials.reflectance.side(0)[0], glm::vec3(0.0F));
+}
+
+TEST(Shade, ARoughCoatIsAPartOfTheDiffuseReflectance) {
+  Material material;
+  material.base_color = glm::vec3(0.5F);
+  material.roughness = 0.5F;
+  const auto materials = shadedFloor(material);
+  EXPECT_EQ(materials.specular.sideCount(), 0U) << "nothing is to be kept for mirrors";
+  EXPECT_EQ(materials.reflectance.side(0)[0], glm::vec3(0.5F));
+}
+
+TEST(Shade, WhatASmoothCoatReflectsIsMissingBelow) {
+  Material material;
+  material.base_color = glm::vec3(0.5F);
+  material.roughness = 0.0F;
+  const auto materials = shadedFloor(material);
+  ASSERT_GT(materials.specular.sideCount(), 0U);
+  EXPECT_NEAR(materials.specular.side(0)[0].x, 0.04F, 1e-6F);
+  EXPECT_EQ(materials.gloss.side(0)[0].y, 1.0F);
+  // Schlick's (1 - cos)^5 is 1/21 in the mean.
+  EXPECT_NEAR(materials.reflectance.side(0)[0].x, 0.5F * (1.0F - 0.04F - 0.96F / 21.0F), 1e-6F);
+}
+
+TEST(Shade, ClearGlassReflectsAllThatItDoesNotLetThrough) {
+  Material material;
+  material.transmission = 1.0F;
+  material.roughness = 0.0F;
+  material.double_sided = true;
+  const auto materials = shadedFloor(material);
+  EXPECT_NEAR(materials.specular.side(0)[0].x, 1.0F, 1e-5F) << "by those rays that do not pass";
+  EXPECT_EQ(materials.gloss.side(0)[0].y, 1.0F);
+  EXPECT_EQ(materials.reflectance.side(0)[0], glm::vec3(0.0F));
+}
+
 TEST(Shade, ReflectanceOfOneIsLoweredWithAWarning) {
   const Scene scene = sceneOf(floorQuad(1.0));
   const PatchScene patches = build(scene, 10);

@@ -1,0 +1,112 @@
+#include "server/engine/publish/mirror_view.h"
+
+#include <array>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <optional>
+
+#include "common/parallel.h"
+#include "common/task.h"
+#include "server/gpu/picture/view_geometry.h"
+#include "server/gpu/picture/view_sky.h"
+#include "server/solver/math/microfacets.h"
+#include "server/solver/math/sampling.h"
+#include "server/solver/rays/leaf_rays.h"
+#include "server/solver/rays/specular_leaves.h"
+
+namespace radiosity::engine {
+namespace {
+
+/// Rays through a pixel, and how far off its corner: so that edges in mirrors are smooth.
+constexpr std::array<glm::dvec2, 4> kOffsets{{{0.375, 0.125}, {0.875, 0.375}, {0.125, 0.625}, {0.625, 0.875}}};
+/// Directions that a rough mirror is looked at in by each of these.
+constexpr std::uint32_t kDirections = 8;
+/// Backs of single-sided faces are not drawn: a ray goes on behind so many.
+constexpr int kMostBacks = 16;
+
+class MirrorView {
+ public:
+  MirrorView(const scene::Camera& camera, const MirrorScene& scene)
+      : scene_(scene),
+        camera_(camera.world),
+        eye_((glm::dvec3(camera.world[3]) - scene.patches->centre) / scene.patches->scale),
+        sides_(solver::makeSides(*scene.patches)),
+        mirrors_(solver::SpecularLeaves::find(sides_, scene.materials)) {
+    if (!mirrors_) return;
+    rays_.emplace(*scene.patches, sides_, mirrors_.get());
+    for (const auto& side : sides_) {
+      const auto emission = scene.materials.emission.side(side.number);
+      const auto reflectance = scene.materials.reflectance.side(side.number);
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+        radiosity_.push_back(emission[leaf] + reflectance[leaf] * scene.irradiance[side.first_node + leaf]);
+    }
+  }
+
+  [[nodiscard]] bool isNeeded() const { return mirrors_ != nullptr; }
+
+  /// Through a place of the picture, in half widths and heights of it at a distance of one.
+  [[nodiscard]] glm::vec3 through(const glm::dvec2& at, std::uint64_t key) const {
+    const auto direction = glm::normalize(glm::dmat3(camera_) * glm::dvec3(at, -1.0));
+    solver::LeafRays::Place from, end;
+    from.position = eye_;
+    auto value = rays_->see(from, direction, key, end);
+    for (int back = 0; back < kMostBacks && value == solver::LeafRays::kNothing; ++back) {
+      from.position = end.position;
+      from.triangle = end.triangle;
+      value = rays_->see(from, direction, key, end);
+    }
+    if (value >= radiosity_.size() || !mirrors_->has(value)) return glm::vec3(0.0F);
+    const double roughness = mirrors_->roughness(value);
+    const std::uint32_t count = roughness > 0.0 ? kDirections : 1;
+    glm::vec3 sum(0.0F);
+    for (std::uint32_t i = 0; i < count; ++i) sum += reflected(end, value, direction, solver::mixKeys(key, i));
+    return sum / static_cast<float>(count);
+  }
+
+ private:
+  [[nodiscard]] glm::vec3 reflected(const solver::LeafRays::Place& at, std::uint32_t value, const glm::dvec3& direction,
+                                    std::uint64_t key) const {
+    const auto reflection =
+        solver::reflectByMicrofacets(at.normal, direction, mirrors_->roughness(value), solver::mixKeys(key, 1));
+    glm::vec3 part(1.0F);
+    for (const double edge : reflection.edges()) part *= mirrors_->reflectance(value, static_cast<float>(edge));
+    solver::LeafRays::Place end;
+    const auto seen = rays_->see(at, reflection.direction, key, end);
+    if (solver::LeafRays::isSky(seen)) return part * gpu::skyRadiance(scene_.sky, reflection.direction);
+    if (seen == solver::LeafRays::kNothing) return glm::vec3(0.0F);
+    return part * radiosity_[seen] * static_cast<float>(std::numbers::inv_pi);
+  }
+
+  const MirrorScene& scene_;
+  glm::dmat4 camera_;
+  glm::dvec3 eye_;
+  std::vector<solver::Side> sides_;
+  std::shared_ptr<const solver::SpecularLeaves> mirrors_;
+  std::optional<solver::LeafRays> rays_;
+  std::vector<glm::vec3> radiosity_;  ///< by leaf value
+};
+
+}  // namespace
+
+void addMirrors(gpu::ViewPicture& picture, const scene::Camera& camera, const MirrorScene& scene) {
+  if (!scene.hasMirrors()) return;
+  const MirrorView view(camera, scene);
+  if (!view.isNeeded()) return;
+  const int width = picture.image.width, height = picture.image.height;
+  const auto half = gpu::halfView(camera, width, height);
+  inTurns(static_cast<std::size_t>(height), [&](std::size_t y) {
+    interruptionPoint();
+    for (int x = 0; x < width; ++x) {
+      const auto i = y * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+      if (picture.cover[i] <= 0.0F) continue;
+      glm::vec3 sum(0.0F);
+      for (std::size_t k = 0; k < kOffsets.size(); ++k) {
+        const auto at = (glm::dvec2(x, y) + kOffsets[k]) / glm::dvec2(width, height);
+        sum += view.through({(2.0 * at.x - 1.0) * half.x, (1.0 - 2.0 * at.y) * half.y}, solver::mixKeys(i, k));
+      }
+      picture.image.pixels[i] += sum / static_cast<float>(kOffsets.size());
+    }
+  });
+}
+
+}  // namespace radiosity::engine

@@ -1,0 +1,45 @@
+#include "server/solver/rays/specular_leaves.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "server/solver/math/sampling.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// What reflects less than this in all channels is not worth another ray.
+constexpr float kLeast = 0.005F;
+
+bool reflects(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}) >= kLeast; }
+
+std::uint64_t bitsOf(float x) { return std::bit_cast<std::uint32_t>(x); }
+
+}  // namespace
+
+std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Side>& sides,
+                                                           const scene::PatchMaterials& materials) {
+  if (materials.specular.sideCount() == 0) return nullptr;
+  std::shared_ptr<SpecularLeaves> found;
+  std::size_t leaves = 0;
+  for (const auto& side : sides) leaves += side.leaf_count;
+  for (const auto& side : sides) {
+    const auto colours = materials.specular.side(side.number), gloss = materials.gloss.side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      if (!reflects(colours[leaf])) {
+        if (colours.isUniform()) break;
+        continue;
+      }
+      if (!found) found.reset(new SpecularLeaves(leaves));
+      const auto value = side.first_value + leaf;
+      found->roughness_[value] = gloss[leaf].x;
+      found->colour_[value] = glm::vec4(colours[leaf], gloss[leaf].y);
+      const auto& colour = found->colour_[value];
+      found->key_ = mixKeys(mixKeys(found->key_, bitsOf(colour.x) << 32U | bitsOf(colour.y)),
+                            mixKeys(bitsOf(colour.z) << 32U | bitsOf(colour.w), bitsOf(gloss[leaf].x) << 32U | value));
+    }
+  }
+  return found;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,172 @@
+// LeafGather and mirrors: what rays see in them, and what of the light of leaves arrives by way of them.
+#include <utility>
+
+#include "server/solver/math/halves.h"
+#include "server/solver/reflected/leaf_gather.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Calls visit(leaf value, end, part of the leaf's rays) for each ray of a half.
+template <typename Visit>
+void inLeavesOf(const LeafSights& sights, std::size_t half, const Visit& visit) {
+  for (std::uint32_t v = 0; v < sights.leafCount(); ++v) {
+    const auto seen = sights.seen(half, v);
+    const float part = 1.0F / static_cast<float>(seen.size());
+    for (const auto end : seen) visit(v, end, part);
+  }
+}
+
+}  // namespace
+
+/// What the mirror of a step reflects.
+LeafGather::Light32 LeafGather::tintOf(const LeafSights::Step& step) const {
+  const auto mirror = SpecularStep::of(step.by);
+  const auto tint = light_.mirrors->reflectance(mirror.leaf, mirror.edge());
+  return {tint.x, tint.y, tint.z, 0.0F};
+}
+
+/// What the leaf there has that only those see who see it in a mirror.
+LeafGather::Light32 LeafGather::shotAt(std::size_t half, std::uint32_t end) const {
+  if (end >= sights_.endCount()) {
+    const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    if (SpecularStep::is(step.by) && SpecularStep::of(step.by).is_again) return {};
+    end = LeafSights::leafOf(step);
+  }
+  return end < sights_.leafCount() ? halves_[half].shot[end] : Light32{};
+}
+
+/// followSteps() where some steps are of mirrors.
+void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* source) {
+  auto& radiosity = halves_[half].radiosity;
+  auto to = radiosity.begin() + sights_.endCount();
+  for (const auto& step : sights_.steps(half)) {
+    auto& light = *to++;
+    const auto& next = radiosity[step.next];
+    if (!SpecularStep::is(step.by)) {
+      const auto& reflectance = light_.reflectance[step.by];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+        light[c] = reflectance[static_cast<int>(c)] * next[c] + own;
+      }
+      continue;
+    }
+    const auto mirror = SpecularStep::of(step.by);
+    const auto tint = tintOf(step);
+    const auto shot = source != nullptr ? shotAt(half, step.next) : Light32{};
+    light = mirror.is_again ? Light32{} : radiosity[mirror.leaf];
+    for (std::size_t c = 0; c < 3; ++c) light[c] += tint[c] * (next[c] + shot[c]);
+  }
+}
+
+/// On how many leaves the light of each leaf arrives by way of mirrors, as rays are drawn as light leaves; and what
+/// comes from the sky that way.
+void LeafGather::takeMirrors(std::size_t h) {
+  auto& half = halves_[h];
+  half.mirrored.clear();
+  half.shot.clear();
+  if (!light_.mirrors) return;
+  const auto leaves = sights_.leafCount(), ends = sights_.endCount();
+  half.shot.resize(leaves);
+  for (std::uint32_t v = 0; v < leaves; ++v) {
+    const auto shot = light_.lamps[v] + light_.shot[h][v];
+    half.shot[v] = {shot.x, shot.y, shot.z, 0.0F};
+  }
+  std::vector<Light32> arrives(sights_.steps(h).size());
+  std::size_t i = 0;
+  for (const auto& step : sights_.steps(h)) {
+    auto& here = arrives[i++];
+    if (!SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
+    Light32 beyond = step.next >= ends ? arrives[step.next - ends] : Light32{};
+    const bool is_leaf = step.next < leaves ||
+                         (step.next >= ends && (!SpecularStep::is(sights_.steps(h)[step.next - ends].by) ||
+                                                !SpecularStep::of(sights_.steps(h)[step.next - ends].by).is_again));
+    const auto tint = tintOf(step);
+    for (std::size_t c = 0; c < 3; ++c) here[c] = tint[c] * (beyond[c] + (is_leaf ? 1.0F : 0.0F));
+  }
+  half.mirrored.resize(leaves);
+  inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
+    if (end < ends) return;
+    for (std::size_t c = 0; c < 3; ++c) half.mirrored[v][c] += part * arrives[end - ends][c];
+  });
+  takeMirroredSky(h);
+}
+
+/// Beside what rays find of it that no mirror reflects.
+void LeafGather::takeMirroredSky(std::size_t h) {
+  auto& half = halves_[h];
+  const auto ends = sights_.endCount();
+  std::vector<Light32> sky(sights_.steps(h).size());
+  std::size_t i = 0;
+  for (const auto& step : sights_.steps(h)) {
+    auto& here = sky[i++];
+    if (!SpecularStep::is(step.by)) continue;
+    const auto tint = tintOf(step);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float beyond = step.next >= ends          ? sky[step.next - ends][c]
+                           : sights_.isSky(step.next) ? static_cast<float>(half.source[step.next][c])
+                                                      : 0.0F;
+      here[c] = tint[c] * beyond;
+    }
+  }
+  half.sky.assign(sights_.leafCount(), {});
+  inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float light = end >= ends          ? sky[end - ends][c]
+                          : sights_.isSky(end) ? static_cast<float>(half.source[end][c])
+                                               : 0.0F;
+      half.sky[v][c] += part * light;
+    }
+  });
+}
+
+/// Noise is what rays of both halves make of the same light.
+void LeafGather::meanOfShot() {
+  auto &a = halves_[0].shot, &b = halves_[1].shot;
+  for (std::size_t v = 0; v < a.size(); ++v) {
+    for (std::size_t c = 0; c < 3; ++c) a[v][c] = b[v][c] = 0.5F * (a[v][c] + b[v][c]);
+  }
+}
+
+/// What mirrors reflect: what of it arrives on leaves, as those that see it in mirrors receive it, and what leaves the
+/// scene or falls on unlit sides, as it is sent. While what leaves send, in the mean of the halves, is there still.
+void LeafGather::weighMirrors() {
+  mirrored_flux_ = {};
+  if (!light_.mirrors) return;
+  const auto ends = sights_.endCount();
+  for (std::size_t h = 0; h < 2; ++h) {
+    const auto& radiosity = halves_[h].radiosity;
+    struct Out {
+      Light32 sky{}, unlit{};
+    };
+    std::vector<Out> out(sights_.steps(h).size());
+    std::size_t i = 0;
+    for (const auto& step : sights_.steps(h)) {
+      auto& here = out[i++];
+      if (!SpecularStep::is(step.by)) continue;
+      const auto tint = tintOf(step);
+      const auto beyond = step.next >= ends ? out[step.next - ends] : Out{};
+      const float sky = sights_.isSky(step.next) ? 1.0F : 0.0F, unlit = sights_.isAbsorbed(step.next) ? 1.0F : 0.0F;
+      for (std::size_t c = 0; c < 3; ++c) {
+        here.sky[c] = tint[c] * (beyond.sky[c] + sky);
+        here.unlit[c] = tint[c] * (beyond.unlit[c] + unlit);
+      }
+    }
+    inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
+      if (end < ends || !SpecularStep::is(sights_.steps(h)[end - ends].by)) return;
+      const auto by = LeafSights::leafOf(sights_.steps(h)[end - ends]);
+      const auto shot = shotOf(h, v);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double share = 0.5 * areaOf(v) * static_cast<double>(part);
+        const double sent = share * (static_cast<double>(radiosity[v][c]) + shot[c]);
+        const auto& leaves = out[end - ends];
+        escaped_[c] += sent * static_cast<double>(leaves.sky[c]);
+        absorbed_[c] += sent * static_cast<double>(leaves.unlit[c]);
+        mirrored_flux_[c] += sent * static_cast<double>(leaves.sky[c] + leaves.unlit[c]) +
+                             share * static_cast<double>(radiosity[end][c] - radiosity[by][c]);
+      }
+    });
+  }
+}
+
+}  // namespace radiosity::solver

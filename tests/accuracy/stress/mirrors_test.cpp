@@ -1,0 +1,270 @@
+// Mirrors, metal, smooth coats and glass: closed forms, and the path tracer.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "server/scene/shading/shade.h"
+#include "tests/accuracy/stress/stress_solve.h"
+#include "tests/oracle/path_tracer.h"
+#include "tests/oracle/triangle_scene.h"
+#include "tests/scenes/glb_writer.h"
+#include "tests/scenes/scenes.h"
+#include "tests/scenes/shapes.h"
+
+namespace radiosity::accuracy {
+namespace {
+
+using test_scenes::Material;
+using test_scenes::Object;
+using test_scenes::TestScene;
+
+Material mirror(double roughness = 0.0, const glm::dvec3& colour = glm::dvec3(1.0)) {
+  Material material{"mirror", colour, glm::dvec3(0.0)};
+  material.metallic = 1.0;
+  material.roughness = roughness;
+  return material;
+}
+
+/// A closed room with a block of this in it.
+TestScene furnaceWith(const Material& material) {
+  auto scene = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  scene.name = "furnace_with_mirror";
+  const auto number = scene.add(material);
+  Object block{"block", {}, {}};
+  appendBox(block, {0.3, 0.3, 0.3}, {0.6, 0.7, 0.6}, test_scenes::allFaces(number));
+  scene.objects.push_back(block);
+  return scene;
+}
+
+solver::SolverSettings settingsOf(double target) {
+  solver::SolverSettings settings;
+  settings.target_error = target;
+  return settings;
+}
+
+/// By position of the leaf, of whole leaves alone: area, normal and light. Metres.
+struct LeafAt {
+  oracle::Footprint footprint;
+  glm::dvec3 middle, light;
+  std::uint32_t instance;
+};
+std::vector<LeafAt> wholeLeaves(const Solve& solve) {
+  std::vector<LeafAt> leaves;
+  const auto& patches = solve.patches();
+  const auto light = solve.solver().irradiance();
+  for (const auto& surface : patches.surfaces) {
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      if (surface.first_node[side] == scene::kNone) continue;
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+        const auto& point = patches.leaves[surface.first_leaf + leaf];
+        if (point.triangle == scene::kNone || !point.full) continue;
+        const auto& frame = patches.triangles[point.triangle];
+        const auto at = [&](std::uint32_t x, std::uint32_t y) {
+          const auto unit =
+              glm::dvec3(frame.origin) + double(x) * glm::dvec3(frame.du) + double(y) * glm::dvec3(frame.dv);
+          return unit * patches.scale + patches.centre;
+        };
+        const auto x = leaf % surface.width, y = leaf / surface.width;
+        const auto normal = glm::dvec3(side == 0 ? frame.normal : -frame.normal);
+        const auto a = at(x, y), b = at(x + 1, y), c = at(x + 1, y + 1), d = at(x, y + 1);
+        leaves.push_back(
+            {{{{{a, b, c}, normal, oracle::kNoTriangle, {}}, {{a, c, d}, normal, oracle::kNoTriangle, {}}}},
+             0.25 * (a + b + c + d),
+             glm::dvec3(light[surface.first_node[side] + leaf]),
+             surface.instance});
+      }
+    }
+  }
+  return leaves;
+}
+
+/// Of all light, relative RMS against the path tracer at every `step`-th whole leaf, but for the tracer's own noise.
+double offFromPathTracer(const Solve& solve, const TestScene& scene, std::size_t step, std::uint32_t samples) {
+  const auto leaves = wholeLeaves(solve);
+  std::vector<oracle::Footprint> footprints;
+  for (std::size_t i = 0; i < leaves.size(); i += step) footprints.push_back(leaves[i].footprint);
+  oracle::PathOptions options;
+  options.samples = samples;
+  const auto truth = oracle::PathTracer(oracle::triangulate(scene)).irradiance(footprints, options);
+  double square = 0.0, noise = 0.0, all = 0.0, sum = 0.0, sum_found = 0.0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const auto off = leaves[i * step].light - truth[i].mean_lux;
+    square += glm::dot(off, off);
+    noise += glm::dot(truth[i].standard_error, truth[i].standard_error);
+    all += glm::dot(truth[i].mean_lux, truth[i].mean_lux);
+    for (int c = 0; c < 3; ++c) sum += truth[i].mean_lux[c], sum_found += leaves[i * step].light[c];
+  }
+  testing::Test::RecordProperty("tracer_noise", std::to_string(std::sqrt(noise / all)));
+  testing::Test::RecordProperty("rms", std::to_string(std::sqrt(square / all)));
+  testing::Test::RecordProperty("mean", std::to_string(sum_found / sum - 1.0));
+  EXPECT_NEAR(sum_found / sum, 1.0, 0.015);
+  return std::sqrt(std::max(0.0, square - noise) / all);
+}
+
+class MirrorFurnace : public testing::TestWithParam<double> {};
+
+// What sees the same light all around sees it in a white mirror, too, however rough that is: no light is lost.
+TEST_P(MirrorFurnace, KeepsItsLightAroundAWhiteMirror) {
+  Solve solve(load(furnaceWith(mirror(GetParam())), 2400), settingsOf(0.002));
+  EXPECT_TRUE(solve.run());
+  expectSound(solve);
+  const auto off = compareToConstant(solve, 2.0 * std::numbers::pi);
+  EXPECT_LT(std::abs(off.mean), 1e-4);
+  EXPECT_LT(off.rms, 0.002);
+  const auto energy = solve.solver().energy();
+  EXPECT_NEAR(energy.specular[0] / energy.emitted[0], 0.0, 0.01) << "a white mirror keeps nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(Roughness, MirrorFurnace, testing::Values(0.0, 0.3, 0.7, 1.0),
+                         [](const auto& info) { return std::to_string(std::lround(info.param * 10.0)); });
+
+// White below a coat: what the coat reflects, and what comes back through it, are all of the light.
+TEST(CoatedFurnace, LosesNoLightToASmoothCoat) {
+  Material varnish{"varnish", glm::dvec3(0.999), glm::dvec3(0.0)};
+  varnish.roughness = 0.0;
+  Solve solve(load(furnaceWith(varnish), 2400), settingsOf(0.005));
+  EXPECT_TRUE(solve.run());
+  expectSound(solve);
+  EXPECT_LT(std::abs(compareToConstant(solve, 2.0 * std::numbers::pi).mean), 0.002);
+}
+
+/// The half of a room that lies before a mirror, or all of it. A lamp hangs in each half.
+TestScene box(bool is_doubled) {
+  TestScene scene;
+  scene.name = is_doubled ? "doubled_box" : "mirrored_box";
+  const auto white = scene.add({"white", glm::dvec3(0.7, 0.6, 0.5), {}});
+  const auto red = scene.add({"red", glm::dvec3(0.7, 0.2, 0.2), {}});
+  const auto light = scene.add({"light", glm::dvec3(0.5), glm::dvec3(10.0)});
+  const auto glass = scene.add(mirror());
+  Object room{"room", {}, {}};
+  appendBox(room, {is_doubled ? -2.0 : 0.0, 0, 0}, {2, 2, 2},
+            {is_doubled ? red : glass, red, white, white, white, white}, test_scenes::kNoFace, true);
+  scene.objects = {room, test_scenes::makeCeilingLamp("lamp", {1.0, 1.8, 1.0}, 0.6, 0.6, white, light)};
+  if (is_doubled)
+    scene.objects.push_back(test_scenes::makeCeilingLamp("other", {-1.0, 1.8, 1.0}, 0.6, 0.6, white, light));
+  return scene;
+}
+
+/// Texels of a size that divides the room, so that both boxes have the same.
+Loaded loadBox(bool is_doubled) {
+  scene::ChartOptions charts;
+  charts.texel_size_m = 0.1;
+  return loadGlb(test_scenes::encodeGlb(box(is_doubled)), charts);
+}
+
+TEST(Mirrors, ABoxWithAMirrorIsLitAsTheDoubledBox) {
+  Solve mirrored(loadBox(false), settingsOf(0.01)), doubled(loadBox(true), settingsOf(0.005));
+  EXPECT_TRUE(mirrored.run());
+  EXPECT_TRUE(doubled.run());
+  expectSound(mirrored);
+  const auto others = wholeLeaves(doubled);
+  double square = 0.0, all = 0.0, sum = 0.0, sum_other = 0.0;
+  std::size_t matched = 0;
+  for (const auto& leaf : wholeLeaves(mirrored)) {
+    const auto& normal = leaf.footprint.pieces[0].normal;
+    const auto other = std::ranges::find_if(others, [&](const LeafAt& at) {
+      return glm::distance(at.middle, leaf.middle) < 0.01 && glm::dot(at.footprint.pieces[0].normal, normal) > 0.9;
+    });
+    if (other == others.end()) continue;  // the mirror itself
+    const auto off = leaf.light - other->light;
+    square += glm::dot(off, off);
+    all += glm::dot(other->light, other->light);
+    sum += leaf.light.x + leaf.light.y + leaf.light.z;
+    sum_other += other->light.x + other->light.y + other->light.z;
+    ++matched;
+  }
+  RecordProperty("matched", std::to_string(matched));
+  RecordProperty("rms", std::to_string(std::sqrt(square / all)));
+  RecordProperty("mean", std::to_string(sum / sum_other - 1.0));
+  EXPECT_GT(matched, 1500U);
+  EXPECT_NEAR(sum / sum_other, 1.0, 0.005);
+  EXPECT_LT(std::sqrt(square / all), 0.02);
+}
+
+/// A room with this on one wall, and a block of it.
+TestScene roomWith(const Material& material) {
+  auto scene = litRoom();
+  scene.name = "room_with_" + material.name;
+  const auto number = scene.add(material);
+  for (auto& polygon : scene.objects[0].polygons)
+    if (std::ranges::all_of(polygon.corners, [](const auto& corner) { return corner.z < 0.01; }))
+      polygon.material = number;
+  for (auto& polygon : scene.objects[1].polygons) polygon.material = number;
+  return scene;
+}
+
+class RoomWith : public testing::TestWithParam<std::pair<std::string, Material>> {};
+
+TEST_P(RoomWith, IsLitAsThePathTracerHasIt) {
+  const auto scene = roomWith(GetParam().second);
+  Solve solve(load(scene, 4000), settingsOf(0.01));
+  EXPECT_TRUE(solve.run());
+  expectSound(solve);
+  EXPECT_LT(offFromPathTracer(solve, scene, 9, 16384), 0.025);
+}
+
+INSTANTIATE_TEST_SUITE_P(Metal, RoomWith,
+                         testing::Values(std::pair("mirror", mirror(0.0, glm::dvec3(0.95))),
+                                         std::pair("gold", mirror(0.4, {1.0, 0.75, 0.35})),
+                                         std::pair("iron", mirror(0.6, glm::dvec3(0.55))),
+                                         std::pair("varnish",
+                                                   [] {
+                                                     Material varnish{"varnish", {0.6, 0.4, 0.2}, {}};
+                                                     varnish.roughness = 0.1;
+                                                     return varnish;
+                                                   }())),
+                         [](const auto& info) { return info.param.first; });
+
+// A roughness that changes sends only those rays anew that met it, and the light is that of a solve from nothing.
+TEST(Mirrors, AnEditOfRoughnessCastsOnlyRaysThatMetIt) {
+  const auto smooth = load(roomWith(mirror(0.1)), 2000), rough = load(roomWith(mirror(0.6)), 2000);
+  Solve edited(smooth, settingsOf(0.02)), anew(rough, settingsOf(0.02));
+  EXPECT_TRUE(edited.run());
+  EXPECT_TRUE(anew.run());
+  const auto before = edited.solver().irradiance();
+  EXPECT_TRUE(edited.edit(rough.materials));
+  double square = 0.0, all = 0.0;
+  const auto of_anew = anew.solver().irradiance();
+  edited.eachLeaf([&](std::uint32_t node, double area, const glm::dvec3& h) {
+    const auto off = h - glm::dvec3(of_anew[node]);
+    square += area * glm::dot(off, off);
+    all += area * glm::dot(h, h);
+  });
+  EXPECT_LT(std::sqrt(square / all), 0.03);
+  EXPECT_TRUE(edited.edit(smooth.materials));
+  EXPECT_EQ(edited.solver().irradiance(), before) << "what came back is what was";
+}
+
+/// A lamp in a bulb of glass, in a closed room.
+TestScene roomWithBulb(const glm::dvec3& tint) {
+  TestScene scene;
+  scene.name = "bulb";
+  const auto white = scene.add({"white", glm::dvec3(0.7), {}});
+  const auto light = scene.add({"light", glm::dvec3(0.0), glm::dvec3(20.0)});
+  Material glass{"glass", tint, {}};
+  glass.transmission = 1.0;
+  glass.roughness = 0.0;
+  glass.double_sided = true;
+  const auto clear = scene.add(glass);
+  Object room{"room", {}, {}}, bulb{"bulb", {}, {}}, lamp{"lamp", {}, {}};
+  appendBox(room, {0, 0, 0}, {2, 2, 2}, test_scenes::allFaces(white), test_scenes::kNoFace, true);
+  appendSphere(bulb, {1.0, 1.2, 1.0}, 0.3, 2, clear, false);
+  appendBox(lamp, {0.9, 1.1, 0.9}, {1.1, 1.3, 1.1}, test_scenes::allFaces(light));
+  scene.objects = {room, bulb, lamp};
+  return scene;
+}
+
+TEST(Glass, ALampInABulbLightsTheRoom) {
+  const auto scene = roomWithBulb(glm::dvec3(1.0));
+  Solve solve(load(scene, 4000), settingsOf(0.01));
+  (void)solve.run();
+  EXPECT_LT(offFromPathTracer(solve, scene, 9, 16384), 0.025);
+}
+
+}  // namespace
+}  // namespace radiosity::accuracy
