@@ -72,11 +72,11 @@ std::string exr(int width, int height, float first, Imf::Compression compression
 }
 
 TEST(HdrFile, IsReadFlatAndPacked) {
-  const std::string pixel("\x80\x40\x20\x81", 4);  // 128.5, 64.5 and 32.5 / 128
+  const std::string pixel("\x80\x40\x20\x81", 4);  // 1, 0.5, 0.25
   const auto flat = read(hdr("-Y 1 +X 2", pixel + pixel));
   ASSERT_TRUE(flat) << flat.error().text();
   EXPECT_EQ(flat->width, 2U);
-  const auto colour = glm::vec3(128.5F, 64.5F, 32.5F) / 128.0F;
+  const auto colour = glm::vec3(1.0F, 0.5F, 0.25F);
   EXPECT_EQ(flat->texels[1], colour);
   const auto repeated = read(hdr("-Y 1 +X 3", pixel + std::string("\x01\x01\x01\x02", 4)));
   ASSERT_TRUE(repeated) << repeated.error().text();
@@ -207,8 +207,8 @@ TEST(SkyFile, IsReducedAsItIsRead) {
   const auto image = read(hdr("-Y 1 +X 5000", pixels));
   ASSERT_TRUE(image) << image.error().text();
   EXPECT_EQ(image->width, SkyImageMaker::kMostWidth);
-  EXPECT_FLOAT_EQ(image->texels.front().x, 128.5F / 128.0F);
-  EXPECT_FLOAT_EQ(image->texels.back().x, 128.5F / 64.0F);
+  EXPECT_FLOAT_EQ(image->texels.front().x, 1.0F);
+  EXPECT_FLOAT_EQ(image->texels.back().x, 2.0F);
 }
 
 }  // namespace
