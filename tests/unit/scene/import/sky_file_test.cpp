@@ -130,7 +130,7 @@ TEST(ExrFile, IsReadWithAnyCompression) {
 TEST(ExrFile, IsRefusedWithAReason) {
   const auto good = exr(64, 32, 2.0F);
   for (std::size_t cut = 4; cut < good.size(); cut += good.size() / 40) EXPECT_NE(refusal(good.substr(0, cut)), "");
-  for (const float wrong : {-1.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+  for (const float wrong : {1e13F, std::numeric_limits<float>::quiet_NaN()})
     EXPECT_THAT(refusal(exr(64, 32, wrong)), HasSubstr("pixel (0, 0)"));
   EXPECT_THAT(refusal(exr(4, 2, 1.0F, Imf::ZIP_COMPRESSION, {"R", "G"})), HasSubstr("channels R, G and B"));
   // A data window of 4 GB and more in a kilobyte: the header alone decides.
@@ -170,6 +170,25 @@ TEST(ExrFile, IsRefusedWhereItsHeaderCanBeReadInTwoWays) {
   EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels + '\0')), HasSubstr("more than 64"));
   EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels.substr(0, 170))),
               HasSubstr("broken"));
+}
+
+// Filters ring below 0, and a sun is beyond what halves have.
+TEST(ExrFile, IsReadWithNumbersBelowZeroAndWithoutEnd) {
+  const auto readWarned = [](float first, std::string& warning) {
+    const auto bytes = exr(64, 32, first);
+    std::vector<std::string> warnings;
+    const auto image =
+        readSkyFile({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "sky.exr", &warnings);
+    EXPECT_TRUE(image);
+    EXPECT_EQ(warnings.size(), 1U);
+    if (!warnings.empty()) warning = warnings.front();
+    return image ? image->texels[0].y : -1.0F;
+  };
+  std::string warning;
+  EXPECT_EQ(readWarned(-1.0F, warning), 0.0F);
+  EXPECT_THAT(warning, HasSubstr("1 pixels have numbers below 0"));
+  EXPECT_EQ(readWarned(std::numeric_limits<float>::infinity(), warning), 65'504.0F);
+  EXPECT_THAT(warning, HasSubstr("1 pixels have infinite numbers"));
 }
 
 // What else a header has is skipped by its size, whatever it claims of itself: the offsets of lines stay.
