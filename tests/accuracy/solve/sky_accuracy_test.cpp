@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "tests/accuracy/balance.h"
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
@@ -45,15 +46,6 @@ std::string picture(const std::string& name, int width, const std::function<glm:
   const auto file = folder() / (name + ".hdr");
   test_scenes::writeHdr(file, width, width / 2, radiance);
   return file.string();
-}
-
-void expectBalance(const nlohmann::json& report) {
-  const auto& e = report.at("energy");
-  const double emitted = e.at("emitted");
-  const double found = e.at("absorbed").get<double>() + e.at("escaped").get<double>() + e.at("backface").get<double>() +
-                       e.at("unshot").get<double>() + e.at("imbalance").get<double>();
-  EXPECT_NEAR(found / emitted, 1.0, 1e-5);
-  EXPECT_LT(std::abs(e.at("imbalance").get<double>()), 0.02 * emitted);
 }
 
 /// A floor of side 2 about the origin that looks up; nothing else.
