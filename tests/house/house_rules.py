@@ -123,8 +123,7 @@ MAX_MEMBERS = 20
 # Libraries that have one home: pattern of the header's name, its name in the message, the folders that may include it.
 LIBRARY_HOMES = [
     (r"(GL|EGL|GLES\d?|KHR|epoxy)/", "OpenGL and EGL headers", ["server/gpu/", "tests/"]),
-    (r"boost/math/", "Boost.Math", ["server/solver/planes/", "tests/"]),
-    (r"boost/(?!math/)", "Boost", ["server/net/", r"server/(main|options)[^/]*$", "client/lib/", "tests/"]),
+    (r"boost/", "Boost", ["server/net/", r"server/(main|options)[^/]*$", "client/lib/", "tests/"]),
     (r"sqlite3", "SQLite", ["server/state/", "tests/"]),
     (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
     (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),

@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
+constexpr int kTriangles = 4, kFan = 6;  // a strip is between them
 
 glm::dmat4 localMatrix(const json& node) {
   glm::dmat4 m(1.0);

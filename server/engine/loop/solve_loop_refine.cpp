@@ -148,7 +148,7 @@ void SolveLoop::endWithoutMemory() {
 
 /// None take their place: light is solved for as well as was asked for on those that there are.
 void SolveLoop::keepTexels() {
-  dropRefinement();
+  callOffRefinement();
   lit_->setDraft(0.0);
   lit_->retarget(settings_);
 }

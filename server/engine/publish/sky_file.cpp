@@ -22,7 +22,7 @@ void append(Bytes& to, const glm::vec3& nits) {
   const bool is_dark = !(largest > 1e-32F);
   if (!is_dark) (void)std::frexp(largest, &exponent);
   const float scale = is_dark ? 0.0F : std::ldexp(256.0F, -exponent);
-  for (int c = 0; c < 3; ++c) to.push_back(static_cast<std::uint8_t>(std::min(255.0F, nits[c] * scale)));
+  for (int c = 0; c < 3; ++c) to.push_back(static_cast<std::uint8_t>(std::min(255.0F, std::round(nits[c] * scale))));
   to.push_back(static_cast<std::uint8_t>(is_dark ? 0 : exponent + 128));
 }
 

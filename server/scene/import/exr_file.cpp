@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -193,8 +194,37 @@ class ExrHeader {
   float white_ = 1.0F;
 };
 
+/// Numbers that are no light and yet are usual: filters ring below 0, and a sun is beyond what halves have.
+class OddPixels {
+ public:
+  void mend(std::span<glm::vec3> row) {
+    constexpr float kLargestHalf = 65'504.0F;
+    for (auto& pixel : row) {
+      const auto before = pixel;
+      for (int c = 0; c < 3; ++c)
+        if (pixel[c] == HUGE_VALF) pixel[c] = kLargestHalf;
+      if (pixel != before) ++endless_;
+      const bool is_below = pixel.x < 0.0F || pixel.y < 0.0F || pixel.z < 0.0F;
+      if (!is_below) continue;
+      ++below_;
+      for (int c = 0; c < 3; ++c)
+        if (pixel[c] < 0.0F) pixel[c] = 0.0F;
+    }
+  }
+  void tell(std::vector<std::string>* warnings) const {
+    if (warnings == nullptr) return;
+    if (below_ > 0) warnings->push_back(std::to_string(below_) + " pixels have numbers below 0, which count as 0");
+    if (endless_ > 0)
+      warnings->push_back(std::to_string(endless_) + " pixels have infinite numbers, which count as 65504");
+  }
+
+ private:
+  std::uint64_t below_ = 0, endless_ = 0;
+};
+
 /// Throws what the library does.
-Result<SkyImage> readPixels(std::span<const std::uint8_t> bytes, const ExrHeader& header, const std::string& where) {
+Result<SkyImage> readPixels(std::span<const std::uint8_t> bytes, const ExrHeader& header, const std::string& where,
+                            std::vector<std::string>* warnings) {
   MemoryFile memory(header.head(), bytes);
   Imf::InputFile file(memory, 0);
   const auto& channels = file.header().channels();
@@ -212,6 +242,7 @@ Result<SkyImage> readPixels(std::span<const std::uint8_t> bytes, const ExrHeader
   const auto rows = static_cast<std::size_t>(window.max.y - window.min.y + 1);
   SkyImageMaker maker(columns, rows);
   std::vector<glm::vec3> row(columns);
+  OddPixels odd;
   // The first pixel of a line; pixel x of line y is at base + x * step, for each line.
   const auto slice = [&](int c) {
     auto* base = reinterpret_cast<char*>(&row[0][c]) -
@@ -224,23 +255,28 @@ Result<SkyImage> readPixels(std::span<const std::uint8_t> bytes, const ExrHeader
   for (std::size_t y = 0; y < rows; ++y) {
     interruptionPoint();
     file.readPixels(window.min.y + static_cast<int>(y));
-    for (auto& pixel : row) pixel = header.white() * (is_grey ? glm::vec3(pixel.x) : pixel);
+    if (is_grey)
+      for (auto& pixel : row) pixel = glm::vec3(pixel.x);
+    odd.mend(row);
+    for (auto& pixel : row) pixel *= header.white();
     if (auto fault = skyRowFault(row, y); !fault.empty()) return fail(ErrorCode::kInvalidScene, fault, where);
     maker.addRow(row);
   }
+  odd.tell(warnings);
   return maker.take();
 }
 
 }  // namespace
 
-Result<SkyImage> readExr(std::span<const std::uint8_t> bytes, const std::string& where) {
+Result<SkyImage> readExr(std::span<const std::uint8_t> bytes, const std::string& where,
+                         std::vector<std::string>* warnings) {
   ExrHeader header(bytes);
   if (auto fault = header.fault(); !fault.empty()) {
     const bool is_large = fault.find("may have") != std::string::npos;
     return fail(is_large ? ErrorCode::kTooLarge : ErrorCode::kInvalidScene, fault, where);
   }
   try {
-    return readPixels(bytes, header, where);
+    return readPixels(bytes, header, where, warnings);
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const Interrupted&) {

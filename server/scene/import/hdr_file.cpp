@@ -154,14 +154,15 @@ class HdrFile {
     return true;
   }
 
-  /// Writers cut what is below a mantissa's last digit off: half of it is what is lost in the mean.
+  /// As most programs read it: Radiance itself adds half of a mantissa's last digit, which writers cut off in the mean,
+  /// and which is 2 % of what has a mantissa of 25.
   [[nodiscard]] glm::vec3 colourOf(const Rgbe& pixel) const {
     glm::vec3 colour(0.0F);
     if (pixel[3] == 0) return colour;
     const double scale = std::ldexp(1.0, int{pixel[3]} - 136);
     for (int c = 0; c < 3; ++c) {
       const auto mantissa = pixel[static_cast<std::size_t>(c)];
-      if (mantissa > 0) colour[c] = static_cast<float>(scale * (mantissa + 0.5) / exposure_[c]);
+      colour[c] = static_cast<float>(scale * mantissa / exposure_[c]);
     }
     return colour;
   }

@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "common/task.h"
 #include "server/scene/document/document_uri.h"
@@ -162,7 +163,12 @@ class SkyReader {
     }
     return take(
         pointer, known(context_.skies.pictures, before(&ReadSkies::pictures), key, key.buffer != nullptr),
-        [&] { return readSkyFile(bytes, place(context_.document.name, pointer)); },
+        [&] {
+          std::vector<std::string> warnings;
+          auto image = readSkyFile(bytes, place(context_.document.name, pointer), &warnings);
+          for (const auto& warning : warnings) context_.warn(pointer, warning);
+          return image;
+        },
         [&](const SharedSkyPicture& picture) {
           if (key.buffer) context_.skies.pictures.emplace(key, picture);
         });

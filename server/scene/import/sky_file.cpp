@@ -42,10 +42,11 @@ std::string skyRowFault(std::span<const glm::vec3> row, std::size_t number) {
   return {};
 }
 
-Result<SkyImage> readSkyFile(std::span<const std::uint8_t> bytes, const std::string& where) {
+Result<SkyImage> readSkyFile(std::span<const std::uint8_t> bytes, const std::string& where,
+                             std::vector<std::string>* warnings) {
   const auto type = skyFileType(bytes);
   if (type == "image/vnd.radiance") return readHdr(bytes, where);
-  if (type == "image/x-exr") return readExr(bytes, where);
+  if (type == "image/x-exr") return readExr(bytes, where, warnings);
   return fail(ErrorCode::kUnsupported, "is neither a Radiance HDR nor an OpenEXR picture", where);
 }
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/result.h"
 #include "server/scene/values/sky_picture.h"
@@ -18,13 +19,16 @@ inline constexpr std::size_t kMostSkyColumns = 16'384, kMostSkyRows = 8192;
 
 /// Nits where the picture's numbers are, and reduced to what a SkyImage may have. `where` names the file in errors.
 /// kUnsupported: neither format, or parts of them that are not read; kInvalidScene: it is wrong, ends early, or has
-/// numbers below 0, above kMostSkyNits or that are none; kTooLarge. Cost: of the pixels; memory of the image, and of
-/// one block of rows.
-[[nodiscard]] Result<SkyImage> readSkyFile(std::span<const std::uint8_t> bytes, const std::string& where);
+/// numbers above kMostSkyNits or that are none; kTooLarge. What filters leave below 0 is 0, what is infinite in an EXR
+/// is the largest number that halves have; `warnings`, if not null, gets how many pixels. Cost: of the pixels; memory
+/// of the image, and of one block of rows.
+[[nodiscard]] Result<SkyImage> readSkyFile(std::span<const std::uint8_t> bytes, const std::string& where,
+                                           std::vector<std::string>* warnings = nullptr);
 
 /// The two formats: sky_file.cpp tells them apart.
 [[nodiscard]] Result<SkyImage> readHdr(std::span<const std::uint8_t> bytes, const std::string& where);
-[[nodiscard]] Result<SkyImage> readExr(std::span<const std::uint8_t> bytes, const std::string& where);
+[[nodiscard]] Result<SkyImage> readExr(std::span<const std::uint8_t> bytes, const std::string& where,
+                                       std::vector<std::string>* warnings = nullptr);
 
 /// "image/vnd.radiance" or "image/x-exr"; empty: neither.
 [[nodiscard]] std::string_view skyFileType(std::span<const std::uint8_t> bytes);

@@ -1,8 +1,8 @@
 #include "server/solver/planes/plane_figures.h"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <numbers>
 
 namespace radiosity::solver {
 namespace {
@@ -123,6 +123,20 @@ Verdict verdictOf(bool passes, bool fails) {
   return passes ? Verdict::kPasses : fails ? Verdict::kFails : Verdict::kUndecided;
 }
 
+/// Probability that Student's t of whole degrees of freedom lies within +-t: Abramowitz and Stegun, "Handbook of
+/// mathematical functions", 1964, 26.7.3 and 26.7.4.
+double studentWithin(double t, int freedom) {
+  const double angle = std::atan(t / std::sqrt(freedom)), square = squared(std::cos(angle));
+  const bool is_odd = freedom % 2 == 1;
+  double term = is_odd ? std::cos(angle) : 1.0, sum = freedom > 1 ? term : 0.0;
+  for (int k = is_odd ? 3 : 2; k < freedom - 1; k += 2) {
+    term *= square * (k - 1) / k;
+    sum += term;
+  }
+  sum *= std::sin(angle);
+  return is_odd ? 2.0 / std::numbers::pi * (angle + sum) : sum;
+}
+
 /// Variance of an estimate by rays, which scatter from round to round, and by the solve.
 struct Variance {
   double rays = 0.0, rounds = 0.0, solve = 0.0;
@@ -188,7 +202,15 @@ PlaneVerdict verdictOn(const Estimates& of, double systematic, const PlaneGoal& 
 }  // namespace
 
 double studentQuantile(double confidence, double freedom) {
-  return boost::math::quantile(boost::math::students_t(freedom), confidence);
+  constexpr double kMostFreedom = 10'000.0;  // there it is the normal distribution's to a ten-thousandth
+  const auto whole = static_cast<int>(std::clamp(freedom, 1.0, kMostFreedom));
+  double least = 0.0, most = 1.0;
+  while (studentWithin(most, whole) < 2.0 * confidence - 1.0) most *= 2.0;
+  for (int step = 0; step < 50; ++step) {
+    const double middle = 0.5 * (least + most);
+    (studentWithin(middle, whole) < 2.0 * confidence - 1.0 ? least : most) = middle;
+  }
+  return most;
 }
 
 PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGoal& goal, double unit) {

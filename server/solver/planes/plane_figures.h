@@ -55,7 +55,8 @@ struct PlaneResult {
 [[nodiscard]] PlaneResult planeFigures(const PlaneRays& rays, double systematic, const PlaneGoal& goal,
                                        double unit = 1.0);
 
-/// The value that Student's t stays below with this probability.
+/// The value that Student's t stays below with this probability, above a half; of degrees of freedom, at least one, the
+/// whole part counts, which is on the safe side. Cost: microseconds for some tens of degrees.
 [[nodiscard]] double studentQuantile(double confidence, double freedom);
 
 }  // namespace radiosity::solver

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "tests/accuracy/balance.h"
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
@@ -39,15 +40,6 @@ Solved solve(const TestScene& scene, const std::vector<std::string>& arguments) 
   const auto file = folder / (scene.name + ".glb");
   test_scenes::writeGlb(scene, file);
   return solveFile(file, arguments);
-}
-
-void expectBalance(const nlohmann::json& report) {
-  const auto& e = report.at("energy");
-  const double emitted = e.at("emitted");
-  const double found = e.at("absorbed").get<double>() + e.at("escaped").get<double>() + e.at("backface").get<double>() +
-                       e.at("unshot").get<double>() + e.at("imbalance").get<double>();
-  EXPECT_NEAR(found / emitted, 1.0, 1e-5);
-  EXPECT_LT(std::abs(e.at("imbalance").get<double>()), 0.02 * emitted);
 }
 
 Accuracy compare(const Solved& solved, std::size_t texels = 800) {

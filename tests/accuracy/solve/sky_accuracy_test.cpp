@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "tests/accuracy/balance.h"
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
@@ -47,15 +48,6 @@ std::string picture(const std::string& name, int width, const std::function<glm:
   return file.string();
 }
 
-void expectBalance(const nlohmann::json& report) {
-  const auto& e = report.at("energy");
-  const double emitted = e.at("emitted");
-  const double found = e.at("absorbed").get<double>() + e.at("escaped").get<double>() + e.at("backface").get<double>() +
-                       e.at("unshot").get<double>() + e.at("imbalance").get<double>();
-  EXPECT_NEAR(found / emitted, 1.0, 1e-5);
-  EXPECT_LT(std::abs(e.at("imbalance").get<double>()), 0.02 * emitted);
-}
-
 /// A floor of side 2 about the origin that looks up; nothing else.
 TestScene floorScene(const std::string& name, double reflectance = 0.0) {
   TestScene scene;
@@ -77,12 +69,12 @@ glm::dvec3 meanOf(const LitScene& lit) {
 }
 
 TEST(SkyPicture, OfOneColourBringsPiTimesItToAnOpenPlane) {
-  const auto sky = picture("even", 64, [](const glm::dvec3&) { return glm::dvec3(1000, 500, 250); });
+  const auto sky = picture("even", 64, [](const glm::dvec3&) { return glm::dvec3(1000, 500, 252); });
   const auto solved =
       solve(floorScene("even"), {"--error", "0.01", "--time-limit", "20", "--texels", "400", "--sky", sky});
   const auto mean = meanOf(solved.lit);
   EXPECT_NEAR(mean.x / (kPi * 1000.0), 1.0, 0.005);
-  EXPECT_NEAR(mean.z / (kPi * 250.0), 1.0, 0.005);
+  EXPECT_NEAR(mean.z / (kPi * 252.0), 1.0, 0.005);
   expectBalance(solved.report);
 }
 
@@ -170,7 +162,9 @@ TEST(Daylight, ItsSunHasAHalfShadowOfHalfADegree) {
                         .target = {0, 0, 0},
                         .intensity = glm::dvec3(1000.0),
                         .angle_deg = 0.533});
-  const auto solved = solve(sun, {"--error", "0.01", "--time-limit", "30", "--texels", "14400"});
+  // Means over texels, which are compared with the middles of these; others are what lookups between them need. Most of
+  // the light, of which the error is a part, is on the edge, and all of the error is on the floor.
+  const auto solved = solve(sun, {"--error", "0.003", "--time-limit", "30", "--texels", "14400", "--means"});
   const double half = 20.0 * std::tan(0.5 * 0.533 * kDegree);
   double square = 0.0, area = 0.0;
   for (const auto& texel : findTexels(solved.lit)) {

@@ -55,17 +55,7 @@ struct SolveBy {
     solver->setLights(sources);
     EXPECT_EQ(test::runToEnd(*solver), StepOutcome::kConverged);
   }
-  /// Mean irradiance of one channel, of a surface's front.
-  [[nodiscard]] double mean(std::size_t surface) const {
-    const auto& of = made.patches->surfaces[surface];
-    const auto light = solver->irradiance();
-    double flux = 0.0, area = 0.0;
-    for (auto node = of.first_node[0]; node < of.first_node[0] + of.width * of.height; ++node) {
-      flux += static_cast<double>(made.patches->node_area[node] * light[node].x);
-      area += static_cast<double>(made.patches->node_area[node]);
-    }
-    return flux / area;
-  }
+  [[nodiscard]] double mean(std::size_t surface) const { return test::meanIrradiance(*solver, *made.patches, surface); }
   /// To what this transport knows of the light of lamps that leaves the scene.
   void expectBalance() const {
     const auto energy = solver->energy();

@@ -42,17 +42,7 @@ struct Solve {
     solver = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings, sources);
     outcome = test::runToEnd(*solver);
   }
-  /// Mean irradiance of one channel, of a surface's front.
-  [[nodiscard]] double mean(std::size_t surface) const {
-    const auto& of = made.patches->surfaces[surface];
-    const auto light = solver->irradiance();
-    double flux = 0.0, area = 0.0;
-    for (auto node = of.first_node[0]; node < of.first_node[0] + of.width * of.height; ++node) {
-      flux += static_cast<double>(made.patches->node_area[node] * light[node].x);
-      area += static_cast<double>(made.patches->node_area[node]);
-    }
-    return flux / area;
-  }
+  [[nodiscard]] double mean(std::size_t surface) const { return test::meanIrradiance(*solver, *made.patches, surface); }
 
   test::QuadScene made;
   RayTransport rays{64};

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
+
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/solver.h"
 
 namespace radiosity::test {
@@ -28,6 +31,18 @@ inline void solve(solver::Solver& solver) {
     if (*outcome == solver::StepOutcome::kConverged) return;
   }
   FAIL() << "no convergence after 100000 steps";
+}
+
+/// Of the first channel, over a surface's front.
+inline double meanIrradiance(const solver::Solver& solver, const scene::PatchScene& patches, std::size_t surface) {
+  const auto& of = patches.surfaces[surface];
+  const auto light = solver.irradiance();
+  double flux = 0.0, area = 0.0;
+  for (auto node = of.first_node[0]; node < of.first_node[0] + of.width * of.height; ++node) {
+    flux += static_cast<double>(patches.node_area[node] * light[node].x);
+    area += static_cast<double>(patches.node_area[node]);
+  }
+  return flux / area;
 }
 
 }  // namespace radiosity::test

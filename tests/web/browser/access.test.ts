@@ -141,7 +141,7 @@ it('reaches every control with Tab, and shows where one is', async () => {
 it('moves between tabs with the arrows', async () => {
   const page = await pages.open(server.url, 1200, 800);
   await page.getByRole('tab', { name: 'View' }).focus();
-  for (const tab of ['Solve', 'Scene', 'Share', 'View']) {
+  for (const tab of ['Solve', 'Scene', 'Measure', 'Share', 'View']) {
     await page.keyboard.press('ArrowRight');
     expect(await page.evaluate(() => document.activeElement?.textContent)).toBe(tab);
     expect(await page.getByRole('tab', { name: tab }).getAttribute('aria-selected')).toBe('true');

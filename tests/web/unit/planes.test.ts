@@ -59,6 +59,13 @@ describe('planes of a document', () => {
     expect(planeKey(moved, 1)).not.toBe(planeKey(before, 1));
     expect(planeKey(sized, 1)).not.toBe(planeKey(before, 1));
     expect(planeKey(named, 1)).toBe(planeKey(before, 1));
+    const below = (x: number): Gltf => {
+      const gltf = room();
+      gltf.nodes![0] = { name: 'floor', children: [1], translation: [x, 0, 0] };
+      return gltf;
+    };
+    expect(planeKey(below(1), 1)).not.toBe(planeKey(below(0), 1));
+    expect(planeKey({ ...below(0), nodes: [{ children: [0] }] }, 0)).toBeDefined(); // a circle ends
   });
 });
 

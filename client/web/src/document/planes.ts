@@ -34,10 +34,28 @@ export function planeNodes(gltf: Gltf): number[] {
     .filter((node) => planeOf(gltf, node));
 }
 
-/** What the light on a plane depends on, as text, apart from the nodes above it. */
+/** A plane and where it lies, as text: also by the nodes above its own. */
 export function planeKey(gltf: Gltf, node: number): string {
-  const { translation, rotation, scale } = gltf.nodes?.[node] ?? {};
-  return JSON.stringify([planeOf(gltf, node), translation, rotation, scale]);
+  const places: unknown[] = [];
+  const met = new Set<number>(); // a document may be wrong
+  for (let at = node; at >= 0 && !met.has(at); at = parentOf(gltf, at)) {
+    const { translation, rotation, scale, matrix } = (gltf.nodes?.[at] ?? {}) as Placed;
+    places.push([translation, rotation, scale, matrix]);
+    met.add(at);
+  }
+  return JSON.stringify([planeOf(gltf, node), places]);
+}
+
+interface Placed {
+  translation?: unknown;
+  rotation?: unknown;
+  scale?: unknown;
+  matrix?: unknown;
+}
+
+/** -1: none. */
+function parentOf(gltf: Gltf, node: number): number {
+  return gltf.nodes?.findIndex(({ children }) => children?.includes(node)) ?? -1;
 }
 
 /** Lists grow only at their ends, so the node's index is known. */

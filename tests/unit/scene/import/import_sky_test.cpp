@@ -84,7 +84,7 @@ TEST(ImportSky, PicturesBecomeABufferView) {
   EXPECT_EQ(sky->strength, 3.0F);
   EXPECT_DOUBLE_EQ(sky->turn_rad, 0.5 * kPi);
   EXPECT_EQ(sky->upper, glm::vec3(1.0F));
-  EXPECT_EQ(sky->picture->image().texels[1], glm::vec3(2.0F * 128.5F / 128.0F));
+  EXPECT_EQ(sky->picture->image().texels[1], glm::vec3(2.0F));
 }
 
 TEST(ImportSky, OfPicturesTellsWhatIsWrong) {

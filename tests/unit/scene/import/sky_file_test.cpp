@@ -72,11 +72,11 @@ std::string exr(int width, int height, float first, Imf::Compression compression
 }
 
 TEST(HdrFile, IsReadFlatAndPacked) {
-  const std::string pixel("\x80\x40\x20\x81", 4);  // 128.5, 64.5 and 32.5 / 128
+  const std::string pixel("\x80\x40\x20\x81", 4);  // 1, 0.5, 0.25
   const auto flat = read(hdr("-Y 1 +X 2", pixel + pixel));
   ASSERT_TRUE(flat) << flat.error().text();
   EXPECT_EQ(flat->width, 2U);
-  const auto colour = glm::vec3(128.5F, 64.5F, 32.5F) / 128.0F;
+  const auto colour = glm::vec3(1.0F, 0.5F, 0.25F);
   EXPECT_EQ(flat->texels[1], colour);
   const auto repeated = read(hdr("-Y 1 +X 3", pixel + std::string("\x01\x01\x01\x02", 4)));
   ASSERT_TRUE(repeated) << repeated.error().text();
@@ -130,7 +130,7 @@ TEST(ExrFile, IsReadWithAnyCompression) {
 TEST(ExrFile, IsRefusedWithAReason) {
   const auto good = exr(64, 32, 2.0F);
   for (std::size_t cut = 4; cut < good.size(); cut += good.size() / 40) EXPECT_NE(refusal(good.substr(0, cut)), "");
-  for (const float wrong : {-1.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+  for (const float wrong : {1e13F, std::numeric_limits<float>::quiet_NaN()})
     EXPECT_THAT(refusal(exr(64, 32, wrong)), HasSubstr("pixel (0, 0)"));
   EXPECT_THAT(refusal(exr(4, 2, 1.0F, Imf::ZIP_COMPRESSION, {"R", "G"})), HasSubstr("channels R, G and B"));
   // A data window of 4 GB and more in a kilobyte: the header alone decides.
@@ -172,6 +172,25 @@ TEST(ExrFile, IsRefusedWhereItsHeaderCanBeReadInTwoWays) {
               HasSubstr("broken"));
 }
 
+// Filters ring below 0, and a sun is beyond what halves have.
+TEST(ExrFile, IsReadWithNumbersBelowZeroAndWithoutEnd) {
+  const auto readWarned = [](float first, std::string& warning) {
+    const auto bytes = exr(64, 32, first);
+    std::vector<std::string> warnings;
+    const auto image =
+        readSkyFile({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "sky.exr", &warnings);
+    EXPECT_TRUE(image);
+    EXPECT_EQ(warnings.size(), 1U);
+    if (!warnings.empty()) warning = warnings.front();
+    return image ? image->texels[0].y : -1.0F;
+  };
+  std::string warning;
+  EXPECT_EQ(readWarned(-1.0F, warning), 0.0F);
+  EXPECT_THAT(warning, HasSubstr("1 pixels have numbers below 0"));
+  EXPECT_EQ(readWarned(std::numeric_limits<float>::infinity(), warning), 65'504.0F);
+  EXPECT_THAT(warning, HasSubstr("1 pixels have infinite numbers"));
+}
+
 // What else a header has is skipped by its size, whatever it claims of itself: the offsets of lines stay.
 TEST(ExrFile, IsReadWithoutAttributesThatNobodyNeeds) {
   const auto good = exr(4, 2, 2.0F, Imf::NO_COMPRESSION, {"R", "G", "B"}, true);
@@ -207,8 +226,8 @@ TEST(SkyFile, IsReducedAsItIsRead) {
   const auto image = read(hdr("-Y 1 +X 5000", pixels));
   ASSERT_TRUE(image) << image.error().text();
   EXPECT_EQ(image->width, SkyImageMaker::kMostWidth);
-  EXPECT_FLOAT_EQ(image->texels.front().x, 128.5F / 128.0F);
-  EXPECT_FLOAT_EQ(image->texels.back().x, 128.5F / 64.0F);
+  EXPECT_FLOAT_EQ(image->texels.front().x, 1.0F);
+  EXPECT_FLOAT_EQ(image->texels.back().x, 2.0F);
 }
 
 }  // namespace

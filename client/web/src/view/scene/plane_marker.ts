@@ -46,6 +46,7 @@ export function cellText(value: number): string {
 
 function drawGrid({ columns, rows, lux = [], maximum }: MeasuredPlane): HTMLCanvasElement | undefined {
   const cell = Math.max(1, Math.min(MOST_CELL_PIXELS, Math.floor(MOST_PIXELS / Math.max(columns, rows))));
+  if (Math.max(columns, rows) > MOST_PIXELS) return undefined; // wider than textures are
   const canvas = document.createElement('canvas');
   canvas.width = columns * cell;
   canvas.height = rows * cell;
