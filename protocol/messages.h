@@ -59,7 +59,7 @@ struct ErrorParts {
 
 struct EnergyParts {
   double emitted = 0.0, absorbed = 0.0;
-  double specular = 0.0;  ///< of mirrors, metal and what lies under smooth coats; older servers do not tell it
+  double specular = 0.0;  ///< of mirrors, metal and glass; older servers do not tell it
   double escaped = 0.0, backface = 0.0, unshot = 0.0;
   double imbalance = 0.0;  ///< may be negative
 };

@@ -52,7 +52,8 @@ struct SurfaceEstimate {
 /// emitted = absorbed + specular + escaped + backface + unshot + imbalance.
 struct EnergyBalance {
   double emitted = 0.0, absorbed = 0.0;
-  double specular = 0.0;  ///< kept by mirrors, metal and what lies under smooth coats; `absorbed` is of the others
+  double specular =
+      0.0;  ///< what arrives at mirrors, metal and glass and is not reflected; `absorbed` is of the others
   double escaped = 0.0, backface = 0.0, unshot = 0.0;
   /// What unbiased sampling lost by chance (negative: gained); it falls with the sampling error.
   double imbalance = 0.0;

@@ -118,9 +118,11 @@ void passThrough(const RTCFilterFunctionNArguments* arguments) {
     auto triangle =
         asked.numbers->of(RTCHitN_geomID(arguments->hit, count, lane), RTCHitN_primID(arguments->hit, count, lane));
     const float u = RTCHitN_u(arguments->hit, count, lane), v = RTCHitN_v(arguments->hit, count, lane);
+    const glm::vec3 direction(RTCRayN_dir_x(arguments->ray, count, lane), RTCRayN_dir_y(arguments->ray, count, lane),
+                              RTCRayN_dir_z(arguments->ray, count, lane));
     bool passes = true;
     for (; asked.key != nullptr && passes && triangle != kNoTriangle; triangle = asked.numbers->after(triangle))
-      passes = asked.passes->passes(triangle, u, v, asked.key[RTCRayN_id(arguments->ray, count, lane)]);
+      passes = asked.passes->passes(triangle, u, v, direction, asked.key[RTCRayN_id(arguments->ray, count, lane)]);
     if (passes) arguments->valid[lane] = 0;
   }
 }

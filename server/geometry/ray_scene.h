@@ -45,11 +45,12 @@ struct alignas(32) Ways {
 };
 
 /// Whether light passes a place on a triangle that one can see through: by chance, from the way's key. `u`, `v`: of the
-/// second and third corner, barycentric. Called by many threads at once.
+/// second and third corner, barycentric. `direction`: of the way, of whatever length. Called by many threads at once.
 class SeeThrough {
  public:
   virtual ~SeeThrough() = default;
-  [[nodiscard]] virtual bool passes(std::uint32_t triangle, float u, float v, std::uint64_t key) const = 0;
+  [[nodiscard]] virtual bool passes(std::uint32_t triangle, float u, float v, const glm::vec3& direction,
+                                    std::uint64_t key) const = 0;
 };
 
 /// Immutable once built, so any number of threads may ask. Copies share the tree.

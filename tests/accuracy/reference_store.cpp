@@ -64,7 +64,7 @@ void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
     hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff),
         hash.add(triangle.transmission);
     const auto& mirror = triangle.mirror;
-    hash.add(mirror.metallic), hash.add(mirror.colour), hash.add(mirror.coat), hash.add(mirror.roughness);
+    hash.add(mirror.metallic), hash.add(mirror.colour), hash.add(mirror.interface), hash.add(mirror.roughness);
     hash.add(mirror.attenuation);
   }
 }

@@ -98,10 +98,9 @@ class MaterialReader {
     if (const auto transmission = extensionOf(material, "KHR_materials_transmission"); transmission.is_object())
       values.transmission = transmission.value("transmissionFactor", 0.0);
     values.see_through = mode != "OPAQUE";
-    if (extensionOf(material, "KHR_materials_pbrSpecularGlossiness").is_object()) return;
+    if (values.transmission <= 0.0) return;
     const auto ior = extensionOf(material, "KHR_materials_ior");
-    values.mirror.coat =
-        coatOf(ior.is_object() ? ior.value("ior", 1.5) : 1.5, values.mirror.roughness, values.transmission);
+    values.mirror.interface = interfaceOf(ior.is_object() ? ior.value("ior", 1.5) : 1.5);
     const auto volume = extensionOf(material, "KHR_materials_volume");
     if (!volume.is_object() || !volume.contains("attenuationColor") || !volume.contains("attenuationDistance")) return;
     const double thickness = volume.value("thicknessFactor", 0.0), distance = volume["attenuationDistance"];

@@ -84,7 +84,7 @@ class PathTracer::Scene {
     sky_map_.prepare();
     for (const auto& triangle : triangles()) {
       see_through_ = see_through_ || triangle.see_through;
-      if (!(triangle.mirror.metallic > 0.0 || triangle.mirror.coat > 0.0)) continue;
+      if (!(triangle.mirror.metallic > 0.0 || triangle.transmission > 0.0)) continue;
       has_mirrors_ = true;
       rough_mirrors_.try_emplace(triangle.mirror.roughness, triangle.mirror.roughness);
     }
@@ -360,12 +360,15 @@ class PathTracer::Scene {
     const auto& triangle = triangles()[hit.triangle];
     const auto [u, v] = Shading::weights(triangle, hit.point.position);
     const auto facing = shading_.mirror(triangle, u, v);
-    if (!facing.any()) return std::nullopt;
+    if (!facing.any() && triangle.transmission <= 0.0) return std::nullopt;
+    // The back of one side passes light; it reflects where that is all the front does.
+    const bool is_dark_back = hit.back && !triangle.double_sided && triangle.transmission < 0.999;
     const double cosine = -glm::dot(direction, hit.point.normal);
     const auto usual = facing.at(cosine);
     const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
     if (random.uniform() < chance) {
       part /= chance;
+      if (is_dark_back) part = glm::dvec3(0.0);
       return reflect(hit.point.normal, direction, facing, rough_mirrors_.at(triangle.mirror.roughness), part, random);
     }
     part /= 1.0 - chance;
@@ -373,13 +376,17 @@ class PathTracer::Scene {
     const double passes = triangle.transmission * (1.0 - triangle.mirror.metallic);
     if (random.uniform() >= passes) {
       part /= 1.0 - triangle.transmission;  // which the reflectance has
+      if (is_dark_back) part = glm::dvec3(0.0);
       return std::nullopt;
     }
     part *= shading_.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
     return direction;
   }
 
-  [[nodiscard]] bool isBlackBack(const Hit& hit) const { return hit.back && !triangles()[hit.triangle].double_sided; }
+  [[nodiscard]] bool isBlackBack(const Hit& hit) const {
+    const auto& triangle = triangles()[hit.triangle];
+    return hit.back && !triangle.double_sided && triangle.transmission <= 0.0;
+  }
 
   void count(const std::optional<Hit>& first, Tally& tally) const {
     tally.open += first ? 0.0 : 1.0;

@@ -41,10 +41,6 @@ glm::dvec3 Shading::reflectance(const Triangle& triangle, double u, double v) co
     const auto specular = triangle.specular * glm::dvec3(colour(triangle.specular_texture, u, v));
     result *= 1.0 - std::max({specular.x, specular.y, specular.z});
   }
-  // Below a coat arrives what that does not reflect: of light from all around 1/21 of the rest, beside what it reflects
-  // straight back.
-  const double coat = triangle.mirror.coat;
-  if (coat > 0.0) result *= (1.0 - coat) * (20.0 / 21.0);
   return glm::clamp((1.0 - triangle.transmission) * result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
 }
 
@@ -58,7 +54,7 @@ Shading::Facing Shading::mirror(const Triangle& triangle, double u, double v) co
   if (const auto* texture = textureOf(triangle.metal); texture != nullptr && metal > 0.0)
     metal *= texture->value(between(triangle.metal.uv, u, v)).z;
   Facing facing{metal * tint(triangle, u, v) / triangle.mirror.attenuation, metal};
-  if (mirror.coat > 0.0) facing = {facing.straight + (1.0 - metal) * mirror.coat, 1.0};
+  if (mirror.interface > 0.0) facing = {glm::dvec3(mirror.interface), 1.0};
   return facing;
 }
 

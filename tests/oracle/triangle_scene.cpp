@@ -11,11 +11,7 @@
 
 namespace radiosity::oracle {
 
-double coatOf(double ior, double roughness, double transmission) {
-  constexpr double kMostRough = 0.2;  // what is rougher counts as diffuse
-  if (roughness > kMostRough && transmission <= 0.0) return 0.0;
-  return std::pow((ior - 1.0) / (ior + 1.0), 2.0);
-}
+double interfaceOf(double ior) { return std::pow((ior - 1.0) / (ior + 1.0), 2.0); }
 
 double area(const Triangle& triangle) {
   const auto& [a, b, c] = triangle.corners;
@@ -42,7 +38,7 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
         triangle.mirror.metallic = material.metallic;
         triangle.mirror.colour = material.reflectance;
         triangle.mirror.roughness = material.roughness;
-        triangle.mirror.coat = coatOf(1.5, material.roughness, material.transmission);
+        triangle.mirror.interface = material.transmission > 0.0 ? interfaceOf(1.5) : 0.0;
         triangle.reflectance *= 1.0 - material.metallic;
         triangle.node = node;
         triangle.material = polygon.material;
@@ -96,7 +92,7 @@ bool sameMaterial(const Triangle& a, const Triangle& b) {
          a.emissive.texture == b.emissive.texture && a.metal.texture == b.metal.texture &&
          a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
          a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission &&
-         a.mirror.metallic == b.mirror.metallic && a.mirror.coat == b.mirror.coat &&
+         a.mirror.metallic == b.mirror.metallic && a.mirror.interface == b.mirror.interface &&
          a.mirror.roughness == b.mirror.roughness;
 }
 

@@ -41,7 +41,7 @@ struct TextureUse {
 struct Mirror {
   double metallic = 0.0;        ///< as the file has it; `Triangle::metal` multiplies it by place
   glm::dvec3 colour{0.0};       ///< of metal, and of what glass lets through; the base colour's texture multiplies it
-  double coat = 0.0;            ///< reflectance of the rest, of light straight at it
+  double interface = 0.0;       ///< of glass: reflectance of one interface, of light straight at it; 0: it is none
   double roughness = 1.0;       ///< its square is the width of the slopes
   glm::dvec3 attenuation{1.0};  ///< of light through a face of glass
 };
@@ -83,8 +83,8 @@ struct TriangleScene {
 };
 
 [[nodiscard]] double area(const Triangle& triangle);
-/// Mirror::coat of what is no metal.
-[[nodiscard]] double coatOf(double ior, double roughness, double transmission);
+/// Mirror::interface of a refractive index.
+[[nodiscard]] double interfaceOf(double ior);
 
 [[nodiscard]] TriangleScene triangulate(const test_scenes::TestScene& scene);
 

@@ -231,14 +231,19 @@ std::string lightName(const LitParts& parts, std::size_t number) {
 }
 
 /// What lamps that are no surfaces send at mirrors.
-void tellMirrors(const solver::Solver& solver, double emitted, std::vector<std::string>& warnings) {
-  const double missing = solver.missingInMirrors();
-  if (!(missing > kMuchInMirrors * emitted)) return;
-  warnings.push_back(
-      fmt::format("{:.1f} % of all light is missing: what mirrors and metal reflect straight from point, "
-                  "spot, area and directional lights, suns and bright skies; emissive surfaces instead "
-                  "of lights have no such gap",
-                  100.0 * missing / emitted));
+void tellMirrors(const LitParts& parts, const solver::Solver& solver, double emitted,
+                 std::vector<std::string>& warnings) {
+  if (!solver.showsMirrors() && parts.materials.specular.sideCount() > 0) {
+    warnings.emplace_back("metal and glass reflect nothing by this method; the default one shows what they do");
+    return;
+  }
+  const double spread = solver.spreadByMirrors();
+  if (!(spread > kMuchInMirrors * emitted)) return;
+  warnings.push_back(fmt::format(
+      "{:.1f} % of all light is what mirrors, metal and glass reflect straight from point, spot, area and "
+      "directional lights, suns and bright skies: it is spread as by a rough surface, since rays do not find "
+      "these in mirrors; emissive surfaces instead of lights are reflected as they are",
+      100.0 * spread / emitted));
 }
 
 }  // namespace
@@ -262,7 +267,7 @@ void LightReport::findDark(const LitParts& parts) {
 void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
   lost_.clear();
   const auto energy = solver.energy();
-  tellMirrors(solver, channelSum(energy.emitted), lost_);
+  tellMirrors(parts, solver, channelSum(energy.emitted), lost_);
   const double emitted = channelSum(energy.emitted), on_backs = channelSum(energy.backface);
   const double lost = std::max(0.0, channelSum(energy.escaped)) + std::max(0.0, on_backs);
   if (!(lost > kNothing * emitted)) return;

@@ -31,9 +31,9 @@ class MirrorView {
         camera_(camera.world),
         eye_((glm::dvec3(camera.world[3]) - scene.patches->centre) / scene.patches->scale),
         sides_(solver::makeSides(*scene.patches)),
-        mirrors_(solver::SpecularLeaves::find(sides_, scene.materials)) {
+        mirrors_(solver::SpecularLeaves::find(sides_, scene.materials, scene.patches->surfaces)) {
     if (!mirrors_) return;
-    rays_.emplace(*scene.patches, sides_, mirrors_.get());
+    rays_.emplace(*scene.patches, sides_);
     for (const auto& side : sides_) {
       const auto emission = scene.materials.emission.side(side.number);
       const auto reflectance = scene.materials.reflectance.side(side.number);

@@ -26,9 +26,10 @@ double LightGatherer::delivered() const {
   return delivered;
 }
 
-/// As LinkColumn::gain, for one shot.
+/// As LinkColumn::gain, for one shot. What glass stops is another part of the light at each angle, and its area is that
+/// of light from all around: what such leaves are delivered is not what the others lack.
 double LightGatherer::conserve(double area, double kept) const {
-  if (kept < kClosed) return 1.0;
+  if (kept < kClosed || receivers_->hasGlass()) return 1.0;
   const double sum = delivered();
   return sum > 0.0 ? std::clamp(kept * area / sum, 0.25, 4.0) : 1.0;
 }

@@ -202,6 +202,8 @@ class Receivers {
   static constexpr float kFar = 4.0F;
 
   /// Whether the item is of a surface that lets light through somewhere.
+  /// Whether any surface of the scene is glass.
+  [[nodiscard]] bool hasGlass() const { return has_glass_; }
   [[nodiscard]] bool isSeeThrough(std::uint32_t item) const {
     return item != scene::kNone && patches_->surfaces[patches_->triangle_surface[item]].see_through;
   }
@@ -258,6 +260,7 @@ class Receivers {
   [[nodiscard]] Meeting opacityAt(std::uint32_t triangle, const glm::vec2& texel) const;
 
   std::shared_ptr<const scene::PatchScene> patches_;
+  bool has_glass_ = false;
   std::vector<Receiver> receivers_;
   std::vector<Group> groups_;
   std::vector<Block> blocks_;

@@ -19,19 +19,19 @@ class Opacity final : public geometry::SeeThrough {
  public:
   explicit Opacity(std::shared_ptr<const scene::PatchScene> patches) : patches_(std::move(patches)) {}
 
-  [[nodiscard]] bool passes(std::uint32_t triangle, float u, float v, std::uint64_t key) const override {
+  [[nodiscard]] bool passes(std::uint32_t triangle, float u, float v, const glm::vec3& direction,
+                            std::uint64_t key) const override {
     const auto texelOf = [&](std::size_t k) {
       return patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].texel;
     };
     const auto texel = texelOf(0) + u * (texelOf(1) - texelOf(0)) + v * (texelOf(2) - texelOf(0));
-    return passesAt(*patches_, triangle, texel, key);
+    return passesAt(*patches_, triangle, texel, direction, key);
   }
 
   [[nodiscard]] static bool passesAt(const scene::PatchScene& patches, std::uint32_t triangle, const glm::vec2& texel,
-                                     std::uint64_t key) {
-    const auto& surface = patches.surfaces[patches.triangle_surface[triangle]];
-    const double opacity = patches.opacityAt(surface, texel) / 255.0;
-    return solver::uniformFromKey(solver::mixKeys(key, triangle)) >= opacity;
+                                     const glm::vec3& direction, std::uint64_t key) {
+    const auto stopped = static_cast<double>(patches.stoppedAt(triangle, texel, direction));
+    return solver::uniformFromKey(solver::mixKeys(key, triangle)) >= stopped;
   }
 
  private:
@@ -122,7 +122,7 @@ geometry::Hit Receivers::goOn(const geometry::Hit& first, const geometry::Ray& r
   for (; hit.found() && passed.size() < kMostSheets; hit = rays().nearest(ray, passed)) {
     if (!patches_->surfaces[patches_->triangle_surface[hit.triangle]].see_through) break;
     const auto texel = texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
-    if (!Opacity::passesAt(*patches_, hit.triangle, texel, key)) break;
+    if (!Opacity::passesAt(*patches_, hit.triangle, texel, ray.direction, key)) break;
     passed.push_back(hit.triangle);
   }
   return hit;

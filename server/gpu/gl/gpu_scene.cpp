@@ -105,8 +105,10 @@ Result<void> GpuScene::uploadOpacity(const EglContext& context) {
   std::vector<std::array<std::uint32_t, 4>> grids;
   for (const auto& surface : scene.surfaces) {
     const auto scale = surface.opacity_scale;
+    const auto facing = static_cast<std::uint32_t>(std::lround(surface.glass.facing * 65535.0F));
+    const std::uint32_t looks = scale | facing << 16U;
     grids.push_back(
-        {surface.first_opacity, surface.width * scale, surface.height * scale, surface.see_through ? scale : 0});
+        {surface.first_opacity, surface.width * scale, surface.height * scale, surface.see_through ? looks : 0});
   }
   auto cells = scene.opacity;
   cells.resize((cells.size() + 3) / 4 * 4, 255);

@@ -22,6 +22,7 @@ layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
 #endif
 #ifdef SEE_THROUGH
 out vec2 opacity_texel;
+out vec4 opacity_toward;
 flat out uvec2 opacity_surface_seed;
 #endif
 
@@ -59,6 +60,12 @@ void main() {
   uvec3 bits = floatBitsToUint(view_right.xyz) * uvec3(0x9E3779B1u, 0x85EBCA77u, 0xC2B2AE3Du);
   uvec3 place = floatBitsToUint(view_origin.xyz) * uvec3(0x27D4EB2Fu, 0x165667B1u, 0x9E3779B1u);
   opacity_texel = texel;
+#ifdef PARALLEL
+  vec3 toward = -view_depth.xyz;
+#else
+  vec3 toward = d;
+#endif
+  opacity_toward = vec4(toward, dot(normal, toward));
   opacity_surface_seed = uvec2(surface, bits.x ^ bits.y ^ bits.z ^ place.x ^ place.y ^ place.z);
 #endif
 #ifdef SCATTER

@@ -165,7 +165,6 @@ class MaterialImporter {
     if (const auto* ior = extensionOf(json, "KHR_materials_ior")) out.ior = clampedIor(ior->value("ior", 1.5));
     if (const auto* transmission = extensionOf(json, "KHR_materials_transmission")) {
       out.transmission = unit(transmission->value("transmissionFactor", 0.0));
-      out.double_sided = out.double_sided || out.transmission > 0.0F;  // glass reflects on both sides of a face
       if (transmission->contains("transmissionTexture")) {
         context_.warn(pointer_, "transmissionTexture is ignored; the factor is used all over");
       }

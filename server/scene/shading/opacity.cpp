@@ -288,7 +288,8 @@ void applyOpacity(PatchScene& patches) {
     interruptionPoint();
     if (!surface.see_through) continue;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
-      const float opacity = leafOpacity(patches, surface, leaf);
+      float opacity = leafOpacity(patches, surface, leaf);
+      if (surface.glass.isGlass()) opacity = surface.glass.meanStopped(opacity);
       for (const auto first : surface.first_node) {
         if (first != kNone) patches.node_area[first + leaf] *= opacity;
       }

@@ -81,7 +81,17 @@ class MaterialShader {
     return value;
   }
 
-  void fill(const Value& value) {
+  /// What hardly reflects as a mirror does reflects all diffusely.
+  static Value folded(Value value) {
+    if (std::max({value.specular.r, value.specular.g, value.specular.b}) >= kLeastSpecular || value.gloss.z > 0.0F)
+      return value;
+    value.reflectance = glm::min(value.reflectance + value.specular, glm::vec3(kMaxReflectance));
+    value.specular = value.gloss = glm::vec3(0.0F);
+    return value;
+  }
+
+  void fill(const Value& whole) {
+    const auto value = folded(whole);
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
       const auto side = out_.emission.sideOf(first);
@@ -138,6 +148,7 @@ class MaterialShader {
       } else if (point.triangle != kNone) {
         value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
       }
+      value = folded(value);
       emission_[i] = value.emission;
       reflectance_[i] = value.reflectance;
       specular_[i] = value.specular;

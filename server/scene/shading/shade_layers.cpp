@@ -72,39 +72,47 @@ void MaterialLayers::addSurface(TexturePyramids& pyramids) {
 }
 
 void MaterialLayers::addSpecularLooks(TexturePyramids& pyramids) {
-  const auto layerOf = [&](const TextureUse& use, bool is_used) {
+  const auto layerOf = [&](const TextureUse& use, bool is_used, bool has_alpha = false) {
     const Texture* texture = is_used ? textureOf(use) : nullptr;
-    return texture != nullptr ? std::optional<Layer>({use, pyramids.of({.colour = texture})}) : std::nullopt;
+    if (texture == nullptr) return std::optional<Layer>();
+    PictureStack stack{.colour = texture};
+    if (has_alpha) setAlpha(texture, stack);
+    return std::optional<Layer>({use, pyramids.of(stack)});
   };
   const bool is_metal = material_.metallic > 0.0F;
-  specular_look_.base = layerOf(material_.base_color_texture, is_metal);
+  specular_look_.base = layerOf(material_.base_color_texture, is_metal, material_.alpha_mode != AlphaMode::kOpaque);
   specular_look_.metal = layerOf(material_.metallic_texture, is_metal);
   specular_look_.rough = layerOf(material_.roughness_texture, is_metal);
   specular_look_.shine = layerOf(material_.specular_texture, material_.specular != glm::vec3(0.0F));
 }
 
-/// `value.reflectance`: what the surface would reflect diffusely without a coat. Of metal that is what the base colour
-/// has more, which holds also where both vary within the place.
+/// `value.reflectance`: what the surface reflects diffusely. Of metal the rest is what the base colour has more, which
+/// holds also where both vary within the place.
 void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough,
                                  Value& value) const {
   value.gloss.x = std::clamp(material_.roughness * rough, 0.0F, 1.0F);
-  if (material_.specular != glm::vec3(0.0F)) {
+  if (isGlass(material_)) {
+    const auto face = glassFace(material_);
+    value.specular = glm::vec3(face.facing);
+    value.gloss.z = enteredPart(material_);
+    // What is left of the light that neither passes nor is reflected, as a part of what does not pass.
+    const float stopped = face.meanStopped(1.0F - passedPart(material_)),
+                reflected = face.meanStopped(face.reflectance(0.0F));
+    value.reflectance *= stopped > 0.0F ? (1.0F - material_.transmission) * (1.0F - reflected) / stopped : 0.0F;
+  } else if (material_.specular != glm::vec3(0.0F)) {
     value.specular = material_.specular * shine;
     value.gloss.y = std::max({value.specular.r, value.specular.g, value.specular.b});
-    return;
+  } else {
+    value.specular = glm::clamp(base - value.reflectance, 0.0F, 1.0F);
+    value.gloss.y = metal * material_.metallic;
   }
-  metal *= material_.metallic;
-  if (metal > 0.0F) value.specular = glm::clamp(base - value.reflectance, 0.0F, 1.0F);
-  value.gloss.y = metal;
-  if (hasCoat(material_)) {
-    const float facing = facingReflectance(material_.ior);
-    value.specular += (1.0F - metal) * facing;
-    value.gloss.y = 1.0F;
-    value.reflectance *= 1.0F - meanReflectance(facing);
-  }
-  if (material_.transmission <= 0.0F) return;
-  // Rays that do not pass meet what is left: as parts of these. Along the surface none pass, and all are reflected.
-  const float stopped = std::max(1.0F - passedPart(material_), 1e-3F);
+}
+
+/// Rays that do not pass meet what is left, as parts of these.
+void MaterialLayers::takePassing(Value& value) const {
+  const float passed = passedPart(material_);
+  if (material_.transmission <= 0.0F || isGlass(material_)) return;
+  const float stopped = std::max(1.0F - passed, 1e-3F);
   value.reflectance *= (1.0F - material_.transmission) / stopped;
   value.specular = glm::min(value.specular / stopped, glm::vec3(1.0F));
 }

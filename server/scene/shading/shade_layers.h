@@ -57,6 +57,7 @@ class MaterialLayers {
                   lookOr1(specular_look_.metal).b, lookOr1(specular_look_.shine), lookOr1(specular_look_.rough).g,
                   value);
     }
+    takePassing(value);
     if (emissive_) value.emission *= look(*emissive_).rgb;
     return value;
   }
@@ -71,6 +72,7 @@ class MaterialLayers {
     return material_.base_color * (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
   }
   void addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough, Value& value) const;
+  void takePassing(Value& value) const;
   void addSpecularLooks(TexturePyramids& pyramids);
   [[nodiscard]] float weightOf(float vertex_alpha) const;
   [[nodiscard]] const Texture* textureOf(const TextureUse& use) const;

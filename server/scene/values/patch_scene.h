@@ -9,8 +9,10 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
@@ -19,6 +21,7 @@
 
 #include "common/result.h"
 #include "server/scene/values/closed_solids.h"
+#include "server/scene/values/glass_face.h"
 #include "server/scene/values/leaf_spots.h"
 #include "server/scene/values/scene.h"
 #include "server/scene/values/side_colours.h"
@@ -81,6 +84,7 @@ struct Surface {
   bool see_through =
       false;           ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
   bool emits = false;  ///< some of it does (emitters.h): of surfaces in one place it is seen
+  GlassFace glass;     ///< how what PatchScene::opacity says for light straight at it depends on the angle
   std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
   std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
   float texel_area = 0.0F;          ///< area of a full leaf, unit box squared
@@ -171,6 +175,15 @@ struct PatchScene {
     const auto row = std::size_t{cell(texel.y, surface.height)} * surface.width * surface.opacity_scale;
     return opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
   }
+  /// Part of the light travelling along `direction`, of whatever length, that a surface one can see through stops at a
+  /// place of a triangle.
+  [[nodiscard]] float stoppedAt(std::uint32_t triangle, const glm::vec2& texel, const glm::vec3& direction) const {
+    const Surface& surface = surfaces[triangle_surface[triangle]];
+    const float opacity = static_cast<float>(opacityAt(surface, texel)) / 255.0F;
+    if (!surface.glass.isGlass()) return opacity;
+    const float along = glm::dot(triangles[triangle].normal, direction);
+    return surface.glass.stopped(opacity, GlassFace::edgeOf(std::abs(along) / glm::length(direction)));
+  }
 
   /// Of triangles that lie in one place and face the same way that of least order is seen: what emits first, so that no
   /// lamp is lost, then what is opaque, and then as in the file, since charts of a mesh lie in any order. Once
@@ -252,7 +265,8 @@ struct PatchMaterials {
   SideColours emission;
   SideColours reflectance;  ///< diffuse
   /// Where surfaces reflect as mirrors do (specular.h): by how much of what comes straight at them, and, of `gloss`, x
-  /// their roughness, y by how much at a grazing angle. No sides: nothing does.
+  /// their roughness, y by how much at a grazing angle, and z how much of what glass does not reflect passes (there the
+  /// law of Surface::glass is that of angles). No sides: nothing does.
   SideColours specular, gloss;
   std::vector<std::string> warnings;
 };

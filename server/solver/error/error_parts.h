@@ -15,8 +15,9 @@ struct ErrorParts {
 };
 
 /// Flux per channel, lux unit^2. emitted = absorbed + specular + escaped + backface + unshot + imbalance. `specular`:
-/// what mirrors, metal and the leaves under smooth coats keep of their light; of all others it is `absorbed`. `unshot`
-/// can be below zero by chance: winners at roulette stand for more, or less, than there is.
+/// what arrives at mirrors and metal, less what rays find in them; with glass, of which no leaf knows what it stops,
+/// all that is not found elsewhere. Of all others it is `absorbed`. `unshot` can be below zero by chance: winners at
+/// roulette stand for more, or less, than there is.
 struct EnergyParts {
   std::array<double, 3> emitted{}, absorbed{}, specular{}, escaped{}, backface{}, unshot{};
   /// What unbiased sampling created or destroyed by chance (gathered light): zero in the mean.

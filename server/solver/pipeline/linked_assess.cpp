@@ -7,6 +7,7 @@
 #include <new>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include "common/parallel.h"
 #include "server/solver/pipeline/linked_solver.h"
@@ -81,17 +82,31 @@ double LinkedSolver::inMirrors() const {
   return power;
 }
 
-double LinkedSolver::missingInMirrors() const {
-  if (!mirrors_ || sources_.empty()) return 0.0;
-  std::vector<glm::vec3> light;
-  system_.irradiance(0, light, LinkSystem::From::kSources);
-  double flux = 0.0;
+/// By leaf value, lm/m^2: what spreadByMirrors() tells of; empty: nothing.
+std::vector<glm::vec3> LinkedSolver::spreadLight() const {
+  if (!mirrors_ || sources_.empty()) return {};
+  std::array<std::vector<glm::vec3>, 2> light;
+  for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
+  for (std::uint32_t value = 0; value < light[0].size(); ++value) {
+    const auto arriving = 0.5F * (light[0][value] + light[1][value]);
+    light[0][value] = mirrors_->has(value) ? mirrors_->meanReflectance(value) * arriving : glm::vec3(0.0F);
+  }
+  return std::move(light[0]);
+}
+
+std::array<double, 3> LinkedSolver::spreadFlux() const {
+  std::array<double, 3> flux{};
+  const auto light = spreadLight();
   for (std::uint32_t value = 0; value < light.size(); ++value) {
-    if (!mirrors_->has(value)) continue;
-    const auto reflected = mirrors_->reflectance(value, 0.0F) * light[value];
-    flux += static_cast<double>(system_.leafAreas()[value] * channelSum(reflected));
+    for (std::size_t c = 0; c < 3; ++c)
+      flux[c] += static_cast<double>(system_.leafAreas()[value] * light[value][static_cast<int>(c)]);
   }
   return flux;
+}
+
+double LinkedSolver::spreadByMirrors() const {
+  const auto flux = spreadFlux();
+  return flux[0] + flux[1] + flux[2];
 }
 
 LinkedSolver::FieldSums LinkedSolver::assessField() const {
@@ -262,19 +277,20 @@ EnergyParts LinkedSolver::energy() const {
       parts.specular[i] += specular[c];
     }
   }
-  const auto sky = skyFlux();
+  const auto sky = skyFlux(), spread = spreadFlux();
   for (std::size_t c = 0; c < 3; ++c) {
     parts.emitted[c] += sky[c];
     if (gathers()) {
       parts.escaped[c] += gather_->escapedFlux()[c] + sky[c] - gather_->skyFlux()[c];
       parts.backface[c] += gather_->absorbedFlux()[c];
-      parts.specular[c] -= gather_->mirroredFlux()[c];
+      parts.specular[c] -= gather_->mirroredFlux()[c] + spread[c];
     } else {
       parts.unshot[c] += sky[c];
     }
     parts.unshot[c] -= sent_for[c];
     parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.specular[c] - parts.escaped[c] -
                          parts.backface[c] - parts.unshot[c];
+    if (mirrors_ && mirrors_->hasGlass() && gathers()) parts.specular[c] += std::exchange(parts.imbalance[c], 0.0);
   }
   return parts;
 }

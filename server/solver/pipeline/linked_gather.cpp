@@ -132,7 +132,7 @@ std::vector<bool> LinkedSolver::lightOverLinks() const {
 }
 
 std::shared_ptr<const LeafRays> LinkedSolver::leafRays() {
-  if (!leaf_rays_) leaf_rays_ = std::make_shared<const LeafRays>(*patches_, sides_, mirrors_.get());
+  if (!leaf_rays_) leaf_rays_ = std::make_shared<const LeafRays>(*patches_, sides_);
   return leaf_rays_;
 }
 
@@ -178,6 +178,8 @@ LeftLight LinkedSolver::leftLight() const {
   light.reflectance = ofLeaves(system_.reflectance());
   light.mirrors = mirrors_;
   if (mirrors_) light.lamps = lampsOfLeaves();
+  const auto spread = spreadLight();
+  for (std::size_t value = 0; value < spread.size(); ++value) light.emission[value] += spread[value];
   light.irradiance = over_links_;
   SkyLight sky(sky_);
   light.sky = sky.hemispheres;

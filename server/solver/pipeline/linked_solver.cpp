@@ -85,7 +85,7 @@ void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
   system_.setMaterials(materials.emission, materials.reflectance);
-  mirrors_ = SpecularLeaves::find(sides_, materials);
+  mirrors_ = SpecularLeaves::find(sides_, materials, patches_->surfaces);
   if (gather_) gather_->reflectBy(mirrors_);
   takeLights();
   double area = 0.0;

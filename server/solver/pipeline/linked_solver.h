@@ -74,7 +74,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
-  [[nodiscard]] double missingInMirrors() const override;
+  [[nodiscard]] bool showsMirrors() const override { return true; }
+  [[nodiscard]] double spreadByMirrors() const override;
   [[nodiscard]] std::shared_ptr<const LeafRays> rays() override { return leafRays(); }
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
   [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
@@ -188,6 +189,8 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] FieldSums assessField() const;
   [[nodiscard]] double inMirrors() const;
+  [[nodiscard]] std::vector<glm::vec3> spreadLight() const;
+  [[nodiscard]] std::array<double, 3> spreadFlux() const;
   void updateVariation();
   [[nodiscard]] bool withLeafLight(const std::function<bool(const LeafLight&)>& work) const;
   [[nodiscard]] bool wantsVariation() const;

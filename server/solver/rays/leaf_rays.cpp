@@ -11,7 +11,6 @@
 
 #include "common/log.h"
 #include "server/solver/math/sampling.h"
-#include "server/solver/rays/specular_leaves.h"
 
 namespace radiosity::solver {
 namespace {
@@ -55,7 +54,7 @@ glm::dvec3 cosineDirection(const glm::dvec3& normal, double u, double v) {
   return radius * std::cos(angle) * a + radius * std::sin(angle) * b + std::sqrt(std::max(0.0, 1.0 - u)) * normal;
 }
 
-LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides, const SpecularLeaves* mirrors)
+LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides)
     : patches_(patches), sides_(sides), side_of_(patches.surfaces.size(), {scene::kNone, scene::kNone}) {
   std::vector<geometry::Triangle> triangles(patches.triangles.size());
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
@@ -76,14 +75,6 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
   }
   findStandIns();
   findEven();
-  if (mirrors != nullptr && !patches.opacity.empty()) findGlass(*mirrors);
-}
-
-void LeafRays::findGlass(const SpecularLeaves& mirrors) {
-  is_glass_.assign(patches_.surfaces.size(), false);
-  for (const auto& side : sides_) {
-    if (patches_.surfaces[side.surface].see_through && mirrors.has(side.first_value)) is_glass_[side.surface] = true;
-  }
 }
 
 /// Charts of a file may be flat but for the rounding of their corners.
@@ -189,16 +180,11 @@ std::uint32_t LeafRays::leafAt(const Side& side, const glm::dvec2& texel) {
 /// Whether a ray goes on through what it met.
 bool LeafRays::passes(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction,
                       std::uint64_t key) const {
-  const auto number = patches_.triangle_surface[hit.triangle];
-  const auto& surface = patches_.surfaces[number];
+  const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
   if (!surface.see_through) return false;
-  const auto& frame = patches_.triangles[hit.triangle];
-  double opacity = patches_.opacityAt(surface, glm::vec2(texelAt(frame, at))) / 255.0;
-  if (!is_glass_.empty() && is_glass_[number]) {  // Schlick 1994
-    const double cosine = std::abs(glm::dot(glm::dvec3(frame.normal), direction));
-    opacity += (1.0 - opacity) * std::pow(std::clamp(1.0 - cosine, 0.0, 1.0), 5.0);
-  }
-  return uniformFromKey(mixKeys(key, hit.triangle)) >= opacity;
+  const auto texel = texelAt(patches_.triangles[hit.triangle], at);
+  const float stopped = patches_.stoppedAt(hit.triangle, glm::vec2(texel), glm::vec3(direction));
+  return uniformFromKey(mixKeys(key, hit.triangle)) >= static_cast<double>(stopped);
 }
 
 void LeafRays::meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
@@ -234,7 +220,9 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       for (std::size_t i = 0; i < sheets; ++i) distance[i] = 0.0F;
       continue;
     }
-    auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+    const auto surface = patches_.triangle_surface[hit.triangle];
+    auto s = side_of_[surface][hit.front ? 0 : 1];
+    if (s == scene::kNone && patches_.surfaces[surface].glass.mirrors_back) s = side_of_[surface][hit.front ? 1 : 0];
     end = {at, {}, kNothing, hit.triangle};
     if (s == scene::kNone) return kNothing;
     auto texel = texelAt(patches_.triangles[hit.triangle], at);

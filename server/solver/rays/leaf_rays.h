@@ -19,8 +19,6 @@
 
 namespace radiosity::solver {
 
-class SpecularLeaves;
-
 class LeafRays {
  public:
   /// Instead of leaf values: nothing that sends light, or a cell of the sky (SkyCells), the first of which is kSky.
@@ -37,9 +35,8 @@ class LeafRays {
                                             ///< one in the same plane and frame
   };
 
-  /// O(n log n) in triangles, on all cores. Both are to outlive it. `mirrors`: of what one can see through these are
-  /// glass, which fewer rays pass the flatter they meet it; null: none. Throws std::bad_alloc.
-  LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides, const SpecularLeaves* mirrors = nullptr);
+  /// O(n log n) in triangles, on all cores. Both are to outlive it. Throws std::bad_alloc.
+  LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
   [[nodiscard]] std::uint32_t indexOfSide(std::uint32_t value) const { return side_of_value_[value]; }
   [[nodiscard]] const Side& sideOf(std::uint32_t value) const { return sides_[side_of_value_[value]]; }
@@ -101,7 +98,6 @@ class LeafRays {
   const std::vector<Side>& sides_;
   void findStandIns();
   void findEven();
-  void findGlass(const SpecularLeaves& mirrors);
   [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
@@ -118,9 +114,8 @@ class LeafRays {
   std::vector<bool> has_stand_in_;  ///< by leaf value: it has no area
   /// Who stands for a leaf value that has no area: another, or kNothing. Ascending.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> stand_ins_;
-  std::vector<bool> is_cut_;    ///< by leaf value
-  std::vector<bool> is_even_;   ///< by surface: flat, and all normals are the same to the bit
-  std::vector<bool> is_glass_;  ///< by surface; empty: none is
+  std::vector<bool> is_cut_;   ///< by leaf value
+  std::vector<bool> is_even_;  ///< by surface: flat, and all normals are the same to the bit
   double greatest_width_ = 0.0;
 };
 

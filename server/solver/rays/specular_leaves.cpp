@@ -8,17 +8,15 @@
 namespace radiosity::solver {
 namespace {
 
-/// What reflects less than this in all channels is not worth another ray.
-constexpr float kLeast = 0.005F;
-
-bool reflects(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}) >= kLeast; }
+bool reflects(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}) > 0.0F; }
 
 std::uint64_t bitsOf(float x) { return std::bit_cast<std::uint32_t>(x); }
 
 }  // namespace
 
 std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Side>& sides,
-                                                           const scene::PatchMaterials& materials) {
+                                                           const scene::PatchMaterials& materials,
+                                                           const std::vector<scene::Surface>& surfaces) {
   if (materials.specular.sideCount() == 0) return nullptr;
   std::shared_ptr<SpecularLeaves> found;
   std::size_t leaves = 0;
@@ -34,6 +32,11 @@ std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Sid
       const auto value = side.first_value + leaf;
       found->roughness_[value] = gloss[leaf].x;
       found->colour_[value] = glm::vec4(colours[leaf], gloss[leaf].y);
+      if (const auto& face = surfaces[side.surface].glass; face.isGlass()) {
+        found->glass_.resize(leaves);
+        found->glass_[value] = {face, gloss[leaf].z};
+        found->key_ = mixKeys(found->key_, bitsOf(gloss[leaf].z));
+      }
       const auto& colour = found->colour_[value];
       found->key_ = mixKeys(mixKeys(found->key_, bitsOf(colour.x) << 32U | bitsOf(colour.y)),
                             mixKeys(bitsOf(colour.z) << 32U | bitsOf(colour.w), bitsOf(gloss[leaf].x) << 32U | value));

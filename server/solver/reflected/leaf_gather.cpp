@@ -28,6 +28,8 @@ constexpr double kWithin = 0.2;
 /// Of a leaf in each half, floats: what GMRES keeps, and the sweeps, of which what is sent is known in double; and what
 /// there is of its light.
 constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLights = 5 * 3 + 4;
+/// Where there are mirrors: what arrives by way of them, what only they show, and what they look like.
+constexpr std::size_t kMirrorLights = 3 * 4 + 6;
 
 using Light32 = std::array<float, 4>;
 
@@ -91,17 +93,31 @@ LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>
       sides_(sides),
       own_area_(areas.empty() ? leafAreas(patches, sides) : std::vector<float>()),
       area_(areas.empty() ? std::span<const float>(own_area_) : areas) {
-  const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
-  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light32));
+  limitSights();
 }
 
-std::size_t LeafGather::leastBytes(std::size_t leaves) {
-  return leaves * (2 * (kVectors + kLights) * sizeof(float) + kFirstRays * LeafSights::kRayBytes);
+void LeafGather::limitSights() {
+  const std::size_t first = sights_.leafCount() * kFirstRays * LeafSights::kRayBytes;
+  sights_.limit(most_bytes_ - std::min(most_bytes_, leastBytes() - first), stepBytes());
+}
+
+void LeafGather::reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) {
+  has_mirrors_ = mirrors != nullptr;
+  sights_.reflectBy(std::move(mirrors));
+  limitSights();
+}
+
+/// Of the light that steps bring, and of what is found for each while mirrors are weighed.
+std::size_t LeafGather::stepBytes() const { return (has_mirrors_ ? 3 : 1) * sizeof(Light32); }
+
+std::size_t LeafGather::leastBytes(std::size_t leaves, bool has_mirrors) {
+  const auto lights = kLights + (has_mirrors ? kMirrorLights : 0);
+  return leaves * (2 * (kVectors + lights) * sizeof(float) + kFirstRays * LeafSights::kRayBytes);
 }
 
 void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
-  const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes(leaves);
-  const std::size_t of_ray = std::max(former.sights_.rayBytes(sizeof(Light32)), sights_.rayBytes(0));
+  const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes();
+  const std::size_t of_ray = std::max(former.sights_.rayBytes(stepBytes()), sights_.rayBytes(0));
   const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * of_ray) : 0;
   const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
@@ -118,9 +134,7 @@ void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
       asked[side.first_value + leaf] = firstRaysOfWide(side, leaf, is_alone);
   }
   const auto usual = std::reduce(asked.begin(), asked.end(), std::size_t{0});
-  const auto fits = [&](std::size_t rays) {
-    return leastBytes(asked.size()) + rays * LeafSights::kRayBytes <= most_bytes_;
-  };
+  const auto fits = [&](std::size_t rays) { return leastBytes() + rays * LeafSights::kRayBytes <= most_bytes_; };
   auto times = timesOfFew(asked.size(), fewest);
   while (times > 1 && !fits(times * usual)) times /= 2;
   for (auto& count : asked)
@@ -377,8 +391,17 @@ glm::dvec3 LeafGather::doubtOf(std::size_t half, std::uint32_t end) const {
     part *= glm::dvec3(light_.reflectance[step.by]);
     sum += kWithin * part * changeAcross(step.by);
   }
+  if (sights_.isMirror(end)) return part * cutOffAt(end);
   const auto& sent = halves_[half].radiosity[end];
   return sum + kUnsure * part * glm::abs(glm::dvec3(sent[0], sent[1], sent[2]));
+}
+
+/// What a mirror reflects that ends rays all the same, of which they bring nothing: as if it did so diffusely.
+glm::dvec3 LeafGather::cutOffAt(std::uint32_t value) const {
+  glm::dvec3 arriving(0.0);
+  for (std::size_t half = 0; half < 2; ++half)
+    arriving += 0.5 * glm::dvec3(light_.irradiance[half][value] + gathered_[half][value]);
+  return glm::dvec3(light_.mirrors->meanReflectance(value)) * glm::abs(arriving);
 }
 
 /// By how much what came over links differs beside the leaf, at most; all of it where nothing is beside.

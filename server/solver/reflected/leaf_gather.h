@@ -63,12 +63,12 @@ class LeafGather {
   LeafGather& operator=(const LeafGather&) = delete;
 
   /// What the equation takes at most, without rays, and with those that a solve begins with.
-  [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
+  [[nodiscard]] static std::size_t leastBytes(std::size_t leaves, bool has_mirrors = false);
 
   /// What rays bring is told for these normals, too; null: for none. It is to outlive this.
   void shadeFor(const LeafShading* shading) { shading_ = shading; }
   /// As LeafSights::reflectBy(), before light is brought that knows of them.
-  void reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) { sights_.reflectBy(std::move(mirrors)); }
+  void reflectBy(std::shared_ptr<const SpecularLeaves> mirrors);
   /// By number of LeafShading: what of irradiance(half) counts for the shading normal. Empty: there are none.
   [[nodiscard]] std::span<const glm::vec3> shadedParts(std::size_t half) const { return shaded_part_[half]; }
 
@@ -171,6 +171,7 @@ class LeafGather {
     /// By leaf: what its rays bring from the sky where its cells are told apart or mirrors show it; empty: they do not.
     std::vector<Light32> sky;
     std::vector<Light32> mirrored;  ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
+    std::vector<float> at_glass;    ///< by leaf: the part of its rays that meet glass first; empty: none does
     std::vector<Light32> shot;      ///< by leaf, what only those in mirrors see: lamps, and what shooters send
     RayGmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
@@ -200,6 +201,13 @@ class LeafGather {
   [[nodiscard]] Light32 tintOf(const LeafSights::Step& step) const;
   [[nodiscard]] Light32 shotAt(std::size_t half, std::uint32_t end) const;
   void takeMirrors(std::size_t half);
+  [[nodiscard]] bool takesLight(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] double atGlass(std::size_t half, std::size_t value) const {
+    return halves_[half].at_glass.empty() ? 0.0 : static_cast<double>(halves_[half].at_glass[value]);
+  }
+  [[nodiscard]] double taken(std::size_t value) const {
+    return light_.mirrors && light_.mirrors->isGlass(static_cast<std::uint32_t>(value)) ? 0.0 : 1.0;
+  }
   void takeMirroredSky(std::size_t half);
   void meanOfShot();
   void weighMirrors();
@@ -256,6 +264,10 @@ class LeafGather {
   void forgetShadedRays();
   void weighDoubt();
   [[nodiscard]] glm::dvec3 doubtOf(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] std::size_t leastBytes() const { return leastBytes(sights_.leafCount(), has_mirrors_); }
+  [[nodiscard]] std::size_t stepBytes() const;
+  void limitSights();
+  [[nodiscard]] glm::dvec3 cutOffAt(std::uint32_t value) const;
   [[nodiscard]] glm::dvec3 changeAcross(std::uint32_t value) const;
   /// By block of leaves: how many rays they have, how many have some, and the one with most; how many times as many
   /// are asked for.
@@ -273,7 +285,7 @@ class LeafGather {
 
   LeafSights sights_;
   std::size_t most_bytes_;
-  bool has_gathered_ = false, lacks_memory_ = false;
+  bool has_gathered_ = false, lacks_memory_ = false, has_mirrors_ = false;
   const std::vector<Side>& sides_;
   std::vector<float> own_area_;
   std::span<const float> area_;  ///< by leaf value, unit box squared

@@ -99,9 +99,8 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   auto blocks = blockRays();
   lacks_memory_ = false;
   const auto steps = sights_.steps(0).size() + sights_.steps(1).size();
-  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes() + sights_.widerBytes(kMostTimes * steps),
-             sights_.rayBytes(sizeof(Light32))};
-  taken.bytes += steps * sizeof(Light32);
+  Room taken{leastBytes() + sights_.bytes() + sights_.widerBytes(kMostTimes * steps), sights_.rayBytes(stepBytes())};
+  taken.bytes += steps * stepBytes();
   refineBlotches(beside, blocks, taken);
   double noise = rayNoise();
   std::priority_queue<Gain> queue;

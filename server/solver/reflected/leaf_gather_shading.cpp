@@ -89,7 +89,7 @@ void LeafGather::keepShadedRays() {
     leaves += side.leaf_count;
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) rays += sights_.counts()[side.first_value + leaf];
   }
-  const auto taken = leastBytes(sights_.leafCount()) + sights_.bytes() + 2 * ShadedRays::bytes(leaves, rays);
+  const auto taken = leastBytes() + sights_.bytes() + 2 * ShadedRays::bytes(leaves, rays);
   if (taken > most_bytes_) return;
   for (auto& half : shaded_rays_) {
     half.resize(shading_->sides().size());

@@ -59,12 +59,24 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
   }
 }
 
-/// On how many leaves the light of each leaf arrives by way of mirrors, as rays are drawn as light leaves; and what
-/// comes from the sky that way.
+/// Whether light that comes to where a ray ends, or goes on, arrives there. What glass stops depends on the angle, and
+/// no leaf knows that from its irradiance, so that it takes none: what it reflects is told by rays alone.
+bool LeafGather::takesLight(std::size_t half, std::uint32_t end) const {
+  if (end >= sights_.endCount()) {
+    const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    if (SpecularStep::is(step.by) && SpecularStep::of(step.by).is_again) return false;
+    end = LeafSights::leafOf(step);
+  }
+  return end < sights_.leafCount() && !light_.mirrors->isGlass(end);
+}
+
+/// On how many leaves the light of each leaf arrives by way of mirrors, as rays are drawn as light leaves; what of it
+/// is stopped by glass at once; and what comes from the sky that way.
 void LeafGather::takeMirrors(std::size_t h) {
   auto& half = halves_[h];
   half.mirrored.clear();
   half.shot.clear();
+  half.at_glass.clear();
   if (!light_.mirrors) return;
   const auto leaves = sights_.leafCount(), ends = sights_.endCount();
   half.shot.resize(leaves);
@@ -77,15 +89,16 @@ void LeafGather::takeMirrors(std::size_t h) {
   for (const auto& step : sights_.steps(h)) {
     auto& here = arrives[i++];
     if (!SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
-    Light32 beyond = step.next >= ends ? arrives[step.next - ends] : Light32{};
-    const bool is_leaf = step.next < leaves ||
-                         (step.next >= ends && (!SpecularStep::is(sights_.steps(h)[step.next - ends].by) ||
-                                                !SpecularStep::of(sights_.steps(h)[step.next - ends].by).is_again));
+    const Light32 beyond = step.next >= ends ? arrives[step.next - ends] : Light32{};
+    const float is_leaf = takesLight(h, step.next) ? 1.0F : 0.0F;
     const auto tint = tintOf(step);
-    for (std::size_t c = 0; c < 3; ++c) here[c] = tint[c] * (beyond[c] + (is_leaf ? 1.0F : 0.0F));
+    for (std::size_t c = 0; c < 3; ++c) here[c] = tint[c] * (beyond[c] + is_leaf);
   }
   half.mirrored.resize(leaves);
+  if (light_.mirrors->hasGlass()) half.at_glass.resize(leaves);
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
+    const auto first = end >= ends ? LeafSights::leafOf(sights_.steps(h)[end - ends]) : end;
+    if (first < leaves && light_.mirrors->isGlass(first)) half.at_glass[v] += part;
     if (end < ends) return;
     for (std::size_t c = 0; c < 3; ++c) half.mirrored[v][c] += part * arrives[end - ends][c];
   });

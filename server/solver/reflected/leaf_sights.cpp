@@ -240,7 +240,8 @@ void LeafSights::giveUpRays(const std::vector<bool>& differs, bool drops_steps) 
 bool LeafSights::endsInDoubt(std::size_t half, std::uint32_t end) const {
   std::size_t count = 0;
   for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
-  return (count == kMostSteps || is_short_) && end < leaf_count_ && isParted(end);
+  if (end >= leaf_count_) return false;
+  return isMirror(end) || ((count == kMostSteps || is_short_) && isParted(end));
 }
 
 std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {

@@ -7,7 +7,8 @@
 // such a leaf go on from where they end. So they do on leaves that lie in part within a wall of an open model: there
 // some rays end at once, on the backs of what bounds it. In closed pockets what leaks is kept for all bounces.
 //
-// Rays that meet a mirror, metal or a smooth coat go on as well, as the surface reflects them (SpecularLeaves).
+// Rays that meet a mirror, metal or glass that they do not pass go on as well, as the surface reflects them
+// (SpecularLeaves).
 #pragma once
 
 #include <array>
@@ -68,6 +69,9 @@ class LeafSights {
   /// Leaves that reflect as mirrors do; null: none does. Rays that met, or now meet, others than before are to be
   /// traced anew.
   void reflectBy(std::shared_ptr<const SpecularLeaves> mirrors);
+  [[nodiscard]] bool isMirror(std::uint32_t value) const {
+    return mirrors_ && value < leaf_count_ && mirrors_->has(value);
+  }
   /// The ray reached a leaf that is parted, or a mirror, and what it saw from there. Later ones go on to earlier ones.
   struct Step {
     std::uint32_t by;    ///< leaf value, or what SpecularStep says
@@ -79,7 +83,7 @@ class LeafSights {
     return SpecularStep::is(step.by) ? SpecularStep::of(step.by).leaf : step.by;
   }
   /// The ray went on as often as a ray may, or there is no memory for more of that, and ends on another leaf that is
-  /// parted.
+  /// parted, or on another mirror.
   [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const {
     return (is_short_ || end >= endCount()) && endsInDoubt(half, end);
   }
@@ -196,9 +200,6 @@ class LeafSights {
   class Way;
   [[nodiscard]] std::uint32_t endOfRay(const LeafRays::Place& place, const glm::dvec3& direction, std::uint64_t key,
                                        const geometry::Hit& first, std::vector<Step>& steps) const;
-  [[nodiscard]] bool isMirror(std::uint32_t value) const {
-    return mirrors_ && value < leaf_count_ && mirrors_->has(value);
-  }
   void giveUpRays(const std::vector<bool>& differs, bool drops_steps);
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
   [[nodiscard]] Slice beginSlice();

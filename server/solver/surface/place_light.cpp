@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "common/parallel.h"
 #include "server/solver/lamps/unhidden.h"
 #include "server/solver/math/microfacets.h"
 #include "server/solver/math/polygon_form_factor.h"
@@ -28,6 +29,7 @@ constexpr std::uint32_t kLampLooks = 32;
 constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
 constexpr std::size_t kMostSteps = 8;
+constexpr std::uint64_t kSpreadSeed = 0x5bd1e995;
 /// What a way in single precision is sent to is known to so much (unit box).
 constexpr double kNearEnd = 1e-5;
 
@@ -62,7 +64,29 @@ PlaceLight::PlaceLight(const SolvedScene& solved)
       reflectance_.push_back(reflectance[leaf]);
     }
   }
+  takeMirrors(solved.materials);
   setIrradiance(solved.irradiance, solved.difference);
+}
+
+void PlaceLight::takeMirrors(const scene::PatchMaterials& materials) {
+  mirrors_ = SpecularLeaves::find(*sides_, materials, patches_.surfaces);
+  if (!mirrors_) return;
+  for (const auto& side : *sides_) {
+    const auto emission = materials.emission.side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      lamp_emission_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
+  }
+  if (sources_.empty()) return;
+  // What rays do not find in mirrors leaves these as if it was diffuse (Solver::spreadByMirrors).
+  inTurns(sides_->size(), [&](std::size_t s) {
+    const auto& side = (*sides_)[s];
+    for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value) {
+      if (!mirrors_->has(value) || !(rays_->areaOf(value) > 0.0)) continue;
+      const auto draw = sobol4(0, mixKeys(kSpreadSeed, value));
+      const auto arrives = fromSources(spotOn(value, {draw.x, draw.y}), mixKeys(kSpreadSeed + 1, value));
+      emission_[value] += mirrors_->meanReflectance(value) * glm::vec3(arrives);
+    }
+  });
 }
 
 void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<const glm::vec3> difference) {
@@ -75,13 +99,6 @@ void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<
       // Of the mean of two, half of what they differ by.
       if (!off_.empty()) off_[value] = 0.5F * reflectance_[value] * difference[side.first_node + leaf];
     }
-  }
-  mirrors_ = SpecularLeaves::find(*sides_, solved.materials);
-  if (!mirrors_) return;
-  for (const auto& side : *sides_) {
-    const auto emission = solved.materials.emission.side(side.number);
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      lamp_emission_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
   }
 }
 
@@ -191,6 +208,11 @@ glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key, Looks looks) 
   for (std::size_t i = 0; i < lamps_.size(); ++i)
     sum += fromLamp(lamps_[i], spot, mixKeys(key, i), looks) * glm::dvec3(lamps_[i].emission);
   if (many_) sum += fromSomeLamps(spot, key);
+  return sum + fromSources(spot, key);
+}
+
+glm::dvec3 PlaceLight::fromSources(const Spot& spot, std::uint64_t key) const {
+  glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const auto& place = spot.place;
     if (sources_[i].kind == PunctualLights::Source::Kind::kLamp) {

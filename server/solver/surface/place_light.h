@@ -94,6 +94,8 @@ class PlaceLight {
     std::size_t steps;
   };
   [[nodiscard]] glm::dvec3 alongMirrors(const Met& met) const;
+  void takeMirrors(const scene::PatchMaterials& materials);
+  [[nodiscard]] glm::dvec3 fromSources(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
@@ -120,7 +122,7 @@ class PlaceLight {
   std::optional<SkyLight> sky_;
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
-  std::vector<glm::vec3> off_;  ///< what radiosity_ is off by; empty: not known
+  std::vector<glm::vec3> off_;                     ///< what radiosity_ is off by; empty: not known
   std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
   std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
 };

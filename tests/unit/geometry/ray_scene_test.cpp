@@ -173,7 +173,8 @@ TEST(RayScene, OpenIsWhatNothingIsMetOn) {
 /// Half of the ways pass, and all of them left of the middle.
 class Blinds final : public SeeThrough {
  public:
-  [[nodiscard]] bool passes(std::uint32_t triangle, float u, float /*v*/, std::uint64_t key) const override {
+  [[nodiscard]] bool passes(std::uint32_t triangle, float u, float /*v*/, const glm::vec3& /*direction*/,
+                            std::uint64_t key) const override {
     return triangle == 1 && (u < 0.25F || key % 2 == 0);
   }
 };
@@ -254,7 +255,8 @@ TEST(RayScene, InPacketsCopiesAreMetAsByRaysAlone) {
 /// One copy of all lets nothing pass where its key says so.
 class OneOpaqueCopy final : public SeeThrough {
  public:
-  [[nodiscard]] bool passes(std::uint32_t triangle, float /*u*/, float /*v*/, std::uint64_t key) const override {
+  [[nodiscard]] bool passes(std::uint32_t triangle, float /*u*/, float /*v*/, const glm::vec3& /*direction*/,
+                            std::uint64_t key) const override {
     return triangle != key;
   }
 };

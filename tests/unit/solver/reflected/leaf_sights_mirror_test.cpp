@@ -28,7 +28,7 @@ class MirrorCube : public testing::Test {
 
   [[nodiscard]] std::shared_ptr<const SpecularLeaves> mirrors(float roughness) {
     made_.materials.gloss.fill(sides_[kMirror].number, glm::vec3(roughness, 1.0F, 0.0F));
-    return SpecularLeaves::find(sides_, made_.materials);
+    return SpecularLeaves::find(sides_, made_.materials, made_.patches->surfaces);
   }
 
   void trace(LeafSights& sights, std::uint16_t count) const {
@@ -103,6 +103,24 @@ TEST_F(MirrorCube, WhatIsNoMirrorAnyMoreEndsRaysAgain) {
     for (const auto end : sights.seen(1, v)) of_other.push_back(end);
     EXPECT_EQ(of_plain, of_other);
   }
+}
+
+TEST_F(MirrorCube, ARayThatEndsOnAnotherMirrorIsDoubtful) {
+  for (std::uint32_t s = 1; s < 6; ++s) made_.materials.specular.fill(sides_[s].number, glm::vec3(1.0F));
+  LeafSights sights(*made_.patches, sides_, 1);
+  sights.reflectBy(mirrors(0.0F));
+  trace(sights, 256);
+  std::size_t cut_off = 0;
+  for (auto v = sides_[0].first_value; v < sides_[0].first_value + sides_[0].leaf_count; ++v) {
+    for (const auto ray : sights.seen(0, v)) {
+      auto end = ray;
+      while (end >= sights.endCount()) end = sights.steps(0)[end - sights.endCount()].next;
+      const bool is_cut_off = sights.sideOf(end) != 0;
+      EXPECT_EQ(sights.isDoubtful(0, ray), is_cut_off);
+      cut_off += is_cut_off ? 1 : 0;
+    }
+  }
+  EXPECT_GT(cut_off, 0U) << "some are reflected more than eight times before they meet the floor again";
 }
 
 TEST(SpecularStep, HoldsItsLeafAndTheMeanOfItsEdge) {
