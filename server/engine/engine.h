@@ -333,6 +333,15 @@ struct MeasureReport {
   std::vector<MeasuredPlane> planes;
 };
 
+/// The photometric web of a light of EXT_lights_ies, with few enough directions to be drawn.
+struct ShownWeb {
+  std::uint64_t revision = 0;
+  double lumens = 0.0, most_candela = 0.0;
+  glm::dvec3 axis{0.0}, across{0.0};  ///< in the node's space: polar angle 0, and azimuth 0 at polar angle 90
+  std::vector<float> polar, azimuth;  ///< degrees; azimuths grow towards cross(across, axis)
+  std::vector<float> candela;         ///< azimuth by azimuth
+};
+
 /// Something mended itself that those who watch may wonder about.
 struct Notice {
   enum class Kind { kRendererReplaced, kSolveRestarted };
@@ -413,6 +422,10 @@ class Engine {
   /// The sky as Radiance HDR, equirectangular, nits. kNotFound: there is none, or it is two colours.
   virtual void skyPicture(Client /*client*/, Callback<SharedBytes> done) {
     done(fail(ErrorCode::kNotFound, "the sky is no picture"));
+  }
+  /// Of the light of this index in EXT_lights_ies. kNotFound: there is none.
+  virtual void lightWeb(std::size_t /*light*/, Client /*client*/, Callback<ShownWeb> done) {
+    done(fail(ErrorCode::kNotFound, "there is no such light"));
   }
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) = 0;

@@ -229,6 +229,11 @@ protocol::Planes toPlanes(const engine::MeasureReport& report) {
   return out;
 }
 
+protocol::Web toWeb(const engine::ShownWeb& web) {
+  return {web.revision,       web.lumens, web.most_candela, triple(web.axis),
+          triple(web.across), web.polar,  web.azimuth,      web.candela};
+}
+
 protocol::Planes withoutLongGrids(protocol::Planes planes) {
   std::size_t points = 0;
   for (const auto& plane : planes.planes) points += plane.illuminance.light.size();

@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "protocol/light_web.h"
 #include "protocol/messages.h"
 #include "server/engine/engine.h"
 
@@ -17,6 +18,7 @@ namespace radiosity::net {
 [[nodiscard]] protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& history);
 [[nodiscard]] protocol::TexelReply toTexelReply(const engine::Texel& texel);
 [[nodiscard]] protocol::Planes toPlanes(const engine::MeasureReport& report);
+[[nodiscard]] protocol::Web toWeb(const engine::ShownWeb& web);
 /// What a message has room for.
 [[nodiscard]] protocol::Planes withoutLongGrids(protocol::Planes planes);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);

@@ -9,6 +9,7 @@
 #include "common/log.h"
 #include "common/printable.h"
 #include "protocol/http_bodies.h"
+#include "protocol/light_web.h"
 #include "protocol/messages.h"
 #include "server/net/convert.h"
 #include "server/net/metrics.h"
@@ -151,6 +152,22 @@ void getSky(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond
   hub->engine().skyPicture(clientOf(request), fileAnswer(*hub, done, "image/vnd.radiance"));
 }
 
+void getWeb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  std::uint32_t light = 0;
+  const auto text = std::string_view(request.path).substr(std::string_view("/webs/").size());
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), light);
+  if (error != std::errc() || std::string_view(end, text.data() + text.size()) != ".json")
+    return done(errorResponse(
+        {ErrorCode::kNotFound, "webs are /webs/<index in EXT_lights_ies>.json, counted from 0", request.path}));
+  hub->engine().lightWeb(light, clientOf(request),
+                         hub->fromEngine<engine::ShownWeb>([done](const Result<engine::ShownWeb>& web) {
+                           if (!web) return done(errorResponse(web.error()));
+                           auto response = plain(200, protocol::encodeHttpWeb(toWeb(*web)));
+                           response.content_type = "application/json";
+                           done(std::move(response));
+                         }));
+}
+
 void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
   std::uint32_t page = 0;
   const auto text = std::string_view(request.path).substr(std::string_view("/lightmaps/").size());
@@ -273,6 +290,7 @@ constexpr std::array kRoutes = {
     Route{"/scene.glb", "GET", getSceneGlb},
     Route{"/scene-unlit.glb", "GET", getUnlitGlb},
     Route{"/sky.hdr", "GET", getSky},
+    Route{"/webs/", "GET", getWeb},
     Route{"/lightmaps/", "GET", getLightmap},
     Route{"/snapshot.png", "GET", getSnapshot},
     Route{"/snapshots/", "GET", getStoredSnapshot},

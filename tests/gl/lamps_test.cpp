@@ -191,6 +191,31 @@ TEST_P(Lamps, AWebOfCosinesIsASmallDisc) {
       kEightPlaces);
 }
 
+TEST_P(Lamps, ABeamOfFiveDegreesIsNeitherLostNorNoisy) {
+  constexpr std::uint32_t kFine = 128;
+  const auto floor = builder_.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, kFine, kFine});
+  std::vector<float> polar, candela;
+  for (int i = 0; i <= 180; ++i) {
+    polar.push_back(static_cast<float>(i));
+    candela.push_back(i <= 2 ? 1000.0F : 0.0F);  // even within 2 degrees, none from 3 on
+  }
+  auto lamp = lampOf(LightKind::kWeb, {}, {0.1, -0.2, 0.3});
+  lamp.web = webOf(polar, candela);
+  light(lamp);
+  for (const double away : {0.0, 1.0, 1.7, 3.5}) {  // degrees
+    const glm::dvec3 at(0.1 + 0.8 * std::tan(away * kPi / 180.0), -0.2, -0.5);
+    const auto x = static_cast<std::uint32_t>((at.x + 0.5) * kFine);
+    const auto way = glm::dvec3(lamp.position) - glm::dvec3((x + 0.5) / kFine - 0.5, 38.5 / kFine - 0.5, -0.5);
+    const double exact = away < 3.0 ? 3000.0 * way.z / std::pow(glm::length(way), 3.0) : 0.0;
+    EXPECT_NEAR(irradiance(floor, x, 38), exact, kEightPlaces * exact) << away;
+  }
+  // A beam that the floor's edge cuts in half: of 16,384 rays all around eleven would tell how much of it is lost.
+  lamp.position = {0.5, 0.0, 0.3};
+  light(lamp, 4);
+  expectBalance(0.01);
+  EXPECT_NEAR(static_cast<double>(flux_.escaped[0]) / kFluxScale / 4.0 / emitted_, 0.5, 0.01);
+}
+
 TEST_P(Lamps, AClosedBoxReceivesAllThatALampEmits) {
   builder_.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), kTexels, true);
   auto web = lampOf(LightKind::kWeb, {});

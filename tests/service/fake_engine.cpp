@@ -421,6 +421,13 @@ void FakeEngine::texel(engine::TexelRequest request, Callback<engine::Texel> don
 }
 
 /// A desk of 3 x 2 points with 100, 101 ... lux, and, where asked for as "long", one of more than a message holds.
+void FakeEngine::lightWeb(std::size_t light, engine::Client /*client*/, Callback<engine::ShownWeb> done) {
+  answer([light, done] {
+    if (light != 2) return done(fail(ErrorCode::kNotFound, "there is no such light"));
+    done(engine::ShownWeb{1, 12.0, 500.0, {0, 0, -1}, {1, 0, 0}, {0, 30, 60}, {0}, {500, 250, 0}});
+  });
+}
+
 void FakeEngine::measure(engine::MeasureRequest request, engine::Client /*client*/,
                          Callback<engine::MeasureReport> done) {
   const auto now = status();

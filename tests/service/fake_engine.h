@@ -75,6 +75,8 @@ class FakeEngine : public engine::Engine {
                    Callback<SharedBytes> done) override;
   void snapshot(engine::SnapshotRequest request, engine::Client client, Callback<engine::Snapshot> done) override;
   void texel(engine::TexelRequest request, Callback<engine::Texel> done) override;
+  /// There is one, of light 2.
+  void lightWeb(std::size_t light, engine::Client client, Callback<engine::ShownWeb> done) override;
   void measure(engine::MeasureRequest request, engine::Client client, Callback<engine::MeasureReport> done) override;
   void callOff() override { called_off_ = true; }
   void addListener(std::weak_ptr<engine::Listener> listener) override;

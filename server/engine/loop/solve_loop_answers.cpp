@@ -12,6 +12,7 @@
 #include "server/engine/publish/plane_report.h"
 #include "server/engine/publish/quantity_pages.h"
 #include "server/engine/publish/sky_file.h"
+#include "server/scene/import/light_web_of.h"
 #include "server/scene/lightmap/lightmap.h"
 
 namespace radiosity::engine {
@@ -109,6 +110,18 @@ void SolveLoop::skyPicture(Client client, Callback<SharedBytes> done) {
     if (!sky) return tl::unexpected<Error>(sky.error());
     if (!sky->picture && !sky->sun) return fail(ErrorCode::kNotFound, "the sky is no picture");
     return std::make_shared<const Bytes>(hdrOfSky(*sky));
+  });
+}
+
+void SolveLoop::lightWeb(std::size_t light, Client client, Callback<ShownWeb> done) {
+  askLong<ShownWeb>(client, std::move(done), [this, light]() -> Result<ShownWeb> {
+    using Moment = std::pair<std::shared_ptr<const scene::Document>, std::uint64_t>;
+    const auto now = fromSolveThread([this]() -> Result<Moment> { return Moment(lit_->sharedDocument(), revision_); });
+    if (!now) return tl::unexpected<Error>(now.error());
+    const auto web = scene::lightWebOf(*now->first, light);
+    if (!web) return tl::unexpected<Error>(web.error());
+    return ShownWeb{now->second, web->lumens, web->most_candela, web->axis,
+                    web->across, web->polar,  web->azimuth,      web->candela};
   });
 }
 

@@ -78,6 +78,7 @@ class SolveLoop final : public Engine {
   void sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) override;
   void unlitGlb(Client client, Callback<SharedBytes> done) override;
   void skyPicture(Client client, Callback<SharedBytes> done) override;
+  void lightWeb(std::size_t light, Client client, Callback<ShownWeb> done) override;
   void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) override;
   void texel(TexelRequest request, Callback<Texel> done) override;

@@ -9,6 +9,7 @@
 #include "common/task.h"
 #include "server/geometry/way_queue.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/transport/lamp_rays.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -156,9 +157,10 @@ LostShare LampGatherer::loseByRays(const solver::LampShot& shot, const solver::L
   const solver::Sobol4 draws(key);
   const auto middle = 0.5F * (box_[0] + box_[1]);
   const float reach = glm::distance(lamp.shape.centre, middle) + glm::distance(box_[0], box_[1]) + lamp.shape.reach();
+  const solver::LampRays leaving(lamp);
   const auto rayOf = [&](std::uint32_t index) -> LostRay {
     const auto draw = draws(index);
-    const auto ray = solver::lampRay(lamp, {draw.x, draw.y, draw.z, draw.w});
+    const auto ray = leaving({draw.x, draw.y, draw.z, draw.w});
     return {{ray.origin + 2.0F * Receivers::kLift * ray.direction, ray.direction, reach}, ray.weight};
   };
   return lostByRays(*receivers_, key, rayOf, [&](float length) { return lamp.fade(static_cast<double>(length)); });

@@ -12,6 +12,8 @@ namespace {
 constexpr double kSameAngle = 1e-3;
 /// A web may send so much more than its lamps are said to.
 constexpr double kLumensOff = 0.05;
+/// Luminaires that let out less of their lamps' light are rare; files whose candela lack a multiplier are not.
+constexpr double kLeastShare = 0.1;
 
 bool isAt(double angle, double at) { return std::abs(angle - at) < kSameAngle; }
 
@@ -172,9 +174,8 @@ bool completeTurns(WebColumns& web, std::vector<std::string>& warnings) {
 
 /// Types A and B: what begins at 0 is the same on both sides.
 bool completeSides(std::vector<double>& angles, std::vector<std::size_t>& rows) {
-  if (angles.size() < 2 || !isAt(angles.back(), 90.0)) return false;
-  if (isAt(angles.front(), -90.0)) return true;
-  if (!isAt(angles.front(), 0.0)) return false;
+  if (angles.size() < 2 || !(angles.back() > 0.0)) return false;
+  if (!isAt(angles.front(), 0.0)) return angles.front() < 0.0;
   std::vector<double> all;
   std::vector<std::size_t> of;
   for (std::size_t i = angles.size(); i-- > 1;) {
@@ -234,9 +235,12 @@ class IesFile {
     if (!numbers_.atEnd()) file_.warnings.push_back(atLine(lines_.number()) + "what follows the candela is ignored");
     // Luminaires swallow a part of what their lamps send, and lamps of -1 lumens are not told.
     const double stated = photometry_.lamps * photometry_.lumens;
-    if (photometry_.lumens > 0.0 && file_.web.lumens > (1.0 + kLumensOff) * stated)
-      file_.warnings.push_back("its web sends " + lumensText(file_.web.lumens) + ", more than the " +
-                               lumensText(stated) + " of its lamps");
+    if (!(photometry_.lumens > 0.0)) return std::move(file_);
+    const auto sends = "its web sends " + lumensText(file_.web.lumens) + ", ";
+    if (file_.web.lumens > (1.0 + kLumensOff) * stated)
+      file_.warnings.push_back(sends + "more than the " + lumensText(stated) + " of its lamps");
+    if (file_.web.lumens > 0.0 && file_.web.lumens < kLeastShare * stated)
+      file_.warnings.push_back(sends + "less than a tenth of the " + lumensText(stated) + " of its lamps");
     return std::move(file_);
   }
 
@@ -263,6 +267,7 @@ class IesFile {
 
   Result<void> turnWeb(std::vector<double>& horizontal, std::vector<double>& vertical) {
     auto columns = upTo(horizontal.size()), rows = upTo(vertical.size());
+    tellOfSides(horizontal, vertical);
     if (!completeSides(horizontal, columns) || !completeSides(vertical, rows))
       return numbers_.bad("angles of types A and B must go from -90 or 0 to 90");
     const bool is_b = photometry_.type == 2;
@@ -271,6 +276,18 @@ class IesFile {
                   return candela_[columns[h] * photometry_.vertical + rows[v]];
                 }).web();
     return {};
+  }
+
+  /// Programs differ on vertical angles from 0; LM-63 wants types A and B to go on to 90.
+  void tellOfSides(const std::vector<double>& horizontal, const std::vector<double>& vertical) {
+    if (isAt(vertical.front(), 0.0))
+      file_.warnings.emplace_back("its vertical angles begin at 0; it is taken to shine alike below and above");
+    const auto isShort = [](const std::vector<double>& angles) {
+      const bool is_whole = isAt(angles.front(), 0.0) || isAt(angles.front(), -90.0);
+      return !is_whole || !isAt(angles.back(), 90.0);
+    };
+    if (isShort(horizontal) || isShort(vertical))
+      file_.warnings.emplace_back("its angles do not go to 90; it is dark beyond them");
   }
 
   Result<void> readCandela() {

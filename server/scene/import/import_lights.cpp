@@ -44,6 +44,7 @@ struct Axes {
     x = glm::normalize(glm::length(across) > 0 ? across : glm::cross(helper, z));
     y = glm::cross(z, x);
   }
+  [[nodiscard]] glm::dvec3 of(const glm::dvec3& own) const { return own.x * x + own.y * y + own.z * z; }
 };
 
 /// Of EXT_lights_area: lamps grow with the largest scale of their node, in all directions.
@@ -118,8 +119,9 @@ class LightPlacer {
     PunctualLight light;
     light.kind = LightKind::kWeb;
     light.web = (*read)->web;
-    light.direction = (*read)->frame == WebFrame::kC ? -axes_.z : (*read)->frame == WebFrame::kA ? axes_.x : -axes_.y;
-    light.across = (*read)->frame == WebFrame::kC ? axes_.x : -axes_.z;
+    const auto own = webAxes((*read)->frame);
+    light.direction = axes_.of(own.axis);
+    light.across = axes_.of(own.across);
     const auto color = of_node.value("color", std::vector<double>{1, 1, 1});
     const auto pointer = node_ + "/extensions/" + kIes;
     if (auto ok = shine(light, of_node.value("multiplier", 1.0), color, pointer + "/multiplier"); !ok) return ok;

@@ -41,6 +41,12 @@ std::optional<double> photometricNumber(std::string_view text) {
   return value;
 }
 
+WebAxes webAxes(WebFrame frame) {
+  const glm::dvec3 x(1, 0, 0), down(0, -1, 0), ahead(0, 0, -1);
+  if (frame == WebFrame::kA) return {x, ahead};
+  return frame == WebFrame::kB ? WebAxes{down, ahead} : WebAxes{ahead, x};
+}
+
 std::string atLine(std::size_t line) { return "line " + std::to_string(line) + ": "; }
 
 std::string lumensText(double lumens) {

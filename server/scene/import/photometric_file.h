@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,6 +27,13 @@ enum class WebFrame {
   kB,  ///< both are 0 at -Z; the vertical one turns about Y towards +X, the horizontal one leans towards -Y
   kA,  ///< both are 0 at -Z; the horizontal one turns about X towards -Y, the vertical one leans towards +X
 };
+
+/// In the lamp's space, unit length: the direction of polar angle 0, and of polar angle 90 and azimuth 0. Azimuths grow
+/// towards cross(across, axis).
+struct WebAxes {
+  glm::dvec3 axis{0.0}, across{0.0};
+};
+[[nodiscard]] WebAxes webAxes(WebFrame frame);
 
 struct PhotometricFile {
   LightWeb web;  ///< in candela, all symmetries written out

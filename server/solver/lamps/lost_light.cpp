@@ -116,14 +116,20 @@ LostLight::Ray LostLight::fromFar(const glm::dvec3& towards, double u, double v)
   return {from, -towards};
 }
 
-LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, std::uint32_t index, std::uint64_t key) const {
+std::optional<LampRays> LostLight::leaving(const scene::PunctualLight& light) const {
+  if (light.kind == scene::LightKind::kDirectional || !hasSizeOrWeb(light)) return std::nullopt;
+  // The cone only weighs rays within the angle that is asked for below, too.
+  const auto web = light.web ? std::span<const float>(light.web->table) : std::span<const float>();
+  return LampRays({lampShape(patches_, light, {}), web});
+}
+
+LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, const LampRays* leaving, std::uint32_t index,
+                                 std::uint64_t key) const {
   const auto at = sobol4(index, key);
   if (light.kind == scene::LightKind::kDirectional) return fromFar(-light.direction, at.x, at.y);
   LeafRays::Place from;
-  if (hasSizeOrWeb(light)) {
-    // The cone only weighs rays within the angle that is asked for below, too.
-    const Lamp lamp{lampShape(patches_, light, {}), light.web ? std::span(light.web->table) : std::span<const float>()};
-    const auto ray = lampRay(lamp, {at.x, at.y, at.z, at.w});
+  if (leaving != nullptr) {
+    const auto ray = (*leaving)({at.x, at.y, at.z, at.w});
     from.position = glm::dvec3(ray.origin);
     if (light.kind != scene::LightKind::kSpot) return {from, glm::dvec3(ray.direction), ray.weight};
     return {from, inCap(light.direction, std::cos(light.outer_cone_rad), at.x, at.y)};
@@ -172,8 +178,9 @@ LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
 LostLight::Fate LostLight::ofLight(const scene::PunctualLight& light) const {
   Fate fate;
   bool sends = false;
+  const auto rays = leaving(light);
   for (std::uint32_t i = 0; i < kRays; ++i) {
-    const auto ray = ofLamp(light, i, kKey);
+    const auto ray = ofLamp(light, rays ? &*rays : nullptr, i, kKey);
     if (!(ray.weight > 0.0)) continue;
     sends = true;
     if (follow(ray, mixKeys(kKey, i), light.range / patches_.scale, fate)) break;
@@ -204,13 +211,17 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
   for (const auto& lamp : lamps)
     senders.add(number++, lamp.flux_per_intensity * glm::dot(lamp.intensity, glm::dvec3(1.0)));
   std::map<std::uint32_t, std::uint32_t> met;  // by instance
-  std::uint32_t all = 0;
+  std::uint32_t all = 0, last = scene::kNone;
+  std::optional<LampRays> rays;
   for (std::uint32_t i = 0; i < kBackRays && !senders.empty(); ++i) {
-    const auto sender = senders.at((i + 0.5) / kBackRays);
+    const auto sender = senders.at((i + 0.5) / kBackRays);  // all draws of one sender follow each other
+    const bool is_light = sender >= first_light && sender < first_sky;
+    if (is_light && sender != std::exchange(last, sender)) rays = leaving(sources.lights[sender - first_light]);
     const auto at = sobol4(i, kKey);
     const auto up = glm::dvec3(0.0, sender == first_sky ? 1.0 : -1.0, 0.0);
-    const auto ray = sender < first_light  ? ofLeaf(sender, i, kKey)
-                     : sender < first_sky  ? ofLamp(sources.lights[sender - first_light], i, kKey)
+    const auto ray = sender < first_light ? ofLeaf(sender, i, kKey)
+                     : sender < first_sky
+                         ? ofLamp(sources.lights[sender - first_light], rays ? &*rays : nullptr, i, kKey)
                      : sender < first_lamp ? fromFar(inCap(up, 0.0, at.z, at.w), at.x, at.y)
                                            : fromFar(towards(lamps[sender - first_lamp], {at.z, at.w}), at.x, at.y);
     if (!(ray.weight > 0.0)) continue;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/patches/side.h"
 #include "server/solver/rays/leaf_rays.h"
+#include "server/solver/transport/lamp_rays.h"
 
 namespace radiosity::solver {
 
@@ -57,7 +59,11 @@ class LostLight {
   /// What sends light, by its flux: leaves, then lights, then the two halves of the sky, then its lamps.
   class Senders;
   [[nodiscard]] Ray ofLeaf(std::uint32_t value, std::uint32_t index, std::uint64_t key) const;
-  [[nodiscard]] Ray ofLamp(const scene::PunctualLight& light, std::uint32_t index, std::uint64_t key) const;
+  /// `leaving`: of a light with a size or a web; null of others.
+  [[nodiscard]] Ray ofLamp(const scene::PunctualLight& light, const LampRays* leaving, std::uint32_t index,
+                           std::uint64_t key) const;
+  /// Of a light with a size or a web; none of others.
+  [[nodiscard]] std::optional<LampRays> leaving(const scene::PunctualLight& light) const;
   /// From outside of the scene, against `towards`.
   [[nodiscard]] Ray fromFar(const glm::dvec3& towards, double u, double v) const;
   /// True: it arrives.

@@ -173,15 +173,10 @@ LampRay lampRay(const Lamp& lamp, const std::array<double, 4>& at) {
     const auto from = around(direction, std::sqrt(1.0 - at[2]), at[3]);  // by the cosine with the ball's normal
     return {shape.centre + shape.half.x * glm::vec3(from), glm::vec3(direction), 1.0};
   }
-  if (shape.kind == Kind::kWeb) {
-    ray.origin = shape.centre;
-    ray.direction = glm::vec3(around(up, 1.0 - 2.0 * at[0], at[1]));
-  } else {
-    ray.origin = glm::vec3(shape.pointOn({at[2], at[3]}));
-    if (shape.kind != Kind::kSpotDisc) return {ray.origin, glm::vec3(around(axis, std::sqrt(1.0 - at[0]), at[1])), 1.0};
-    const auto least = shape.cone_scale > 0.0F ? std::clamp(-shape.cone_offset / shape.cone_scale, 0.0F, 1.0F) : 0.0F;
-    ray.direction = glm::vec3(around(axis, 1.0 - at[0] * (1.0 - static_cast<double>(least)), at[1]));
-  }
+  ray.origin = glm::vec3(shape.pointOn({at[2], at[3]}));
+  if (shape.kind != Kind::kSpotDisc) return {ray.origin, glm::vec3(around(axis, std::sqrt(1.0 - at[0]), at[1])), 1.0};
+  const auto least = shape.cone_scale > 0.0F ? std::clamp(-shape.cone_offset / shape.cone_scale, 0.0F, 1.0F) : 0.0F;
+  ray.direction = glm::vec3(around(axis, 1.0 - at[0] * (1.0 - static_cast<double>(least)), at[1]));
   ray.weight = static_cast<double>(lamp.strength(ray.direction));
   return ray;
 }

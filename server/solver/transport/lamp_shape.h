@@ -80,7 +80,7 @@ struct LampRay {
   glm::vec3 origin{0.0F}, direction{0.0F};
   double weight = 0.0;
 };
-/// `at`: uniform in [0, 1)^4.
+/// `at`: uniform in [0, 1)^4. Of any lamp but a web: LampRays draws from all.
 [[nodiscard]] LampRay lampRay(const Lamp& lamp, const std::array<double, 4>& at);
 
 /// Flux for an intensity of one, unit^2 sr; of a spot with a size, that of a spot without counts; of what is far, what

@@ -1,5 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
+import { addLamp } from '../../../client/web/src/document/new_lamps';
 import { hangingNodes, isSameScene, type Gltf } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
@@ -107,7 +108,7 @@ describe('JSON Patch', () => {
 describe('edits', () => {
   it('add a lamp to a scene without lights, and take it out again', () => {
     const gltf = room();
-    const { patch, node } = edits.addLamp(gltf, [0, 1, 0], 50);
+    const { patch, node } = addLamp(gltf, [0, 1, 0], { type: 'point', candela: 50 });
     const undo = edits.undoOnServer(patch, applyPatch(json(gltf), patch));
     expect(node).toBe(2);
     expect(gltf.scenes![0]!.nodes).toEqual([0, 1, 2]);
@@ -139,7 +140,7 @@ describe('edits', () => {
       'changed box: position',
     );
     const gltf = room();
-    const { patch, node } = edits.addLamp(gltf, [0, 1, 0], 5);
+    const { patch, node } = addLamp(gltf, [0, 1, 0], { type: 'point', candela: 5 });
     applyPatch(json(gltf), patch);
     expect(edits.describePatch(gltf, patch)).toBe('added lamp');
     const removed = edits.detachNode(gltf, node)!;
@@ -220,6 +221,8 @@ describe('scenes', () => {
   it('are the same where most objects of a number have one name', () => {
     expect(isSameScene(named('a', 'b', 'c'), named('a', 'b', 'd'))).toBe(true);
     expect(isSameScene(named('a', undefined), named('a', undefined, 'lamp'))).toBe(true);
+    expect(isSameScene(named('a'), named('a', 'lamp', 'lamp 2', 'panel')), 'it has grown').toBe(true);
+    expect(isSameScene(named(undefined), named(undefined, 'lamp', 'lamp 2'))).toBe(false);
     expect(isSameScene(named('floor', 'wall'), named('far away'))).toBe(false);
     expect(isSameScene(named('a'), named('x', 'y', 'a'))).toBe(false);
   });
@@ -362,7 +365,7 @@ describe('scene document', () => {
   it('adds a lamp once, whether the notification or the answer comes first', async () => {
     for (const notificationFirst of [true, false]) {
       const { document, calls } = session();
-      const { patch } = edits.addLamp(document.gltf, [0, 1, 0], 50);
+      const { patch } = addLamp(document.gltf, [0, 1, 0], { type: 'point', candela: 50 });
       const done = document.edit('Add lamp', patch);
       if (notificationFirst) document.patched(2, patch, 'me');
       calls[0]!.answer(reply(2));
@@ -445,7 +448,7 @@ describe('scene document', () => {
 
   it('asks for the scene anew when its own edit comes back in other words', () => {
     const { document } = session();
-    const { patch } = edits.addLamp(document.gltf, [0, 1, 0], 50);
+    const { patch } = addLamp(document.gltf, [0, 1, 0], { type: 'point', candela: 50 });
     void document.edit('Add lamp', patch);
     const told = patch.map((operation) =>
       operation.path === '/nodes/-' ? { ...operation, path: '/nodes/2' } : operation,

@@ -45,7 +45,7 @@ function house(change: { lamp?: boolean; sun?: boolean } = {}): LitScene {
   if (change.sun) {
     const sun = new LampMarker(9);
     sun.rotation.x = -1; // downwards, and away from who looks from in front
-    sun.display({ type: 'directional' }, 1);
+    sun.display({ light: { type: 'directional' }, outline: [], selected: false }, 1);
     sun.position.set(0, 1, 0); // wherever it hangs
     sun.updateMatrixWorld();
     lamps.set(9, sun);

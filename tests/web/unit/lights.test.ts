@@ -26,9 +26,14 @@ describe('lights', () => {
   const shown = (node: number) => lightOf(lamps(), node)!.fields.map(({ label, value }) => `${label}: ${value}`);
 
   it('tell what may be changed about them, and where that lies', () => {
-    expect(shown(0)).toEqual(['Intensity, nits: 500', 'Height, m: 2', 'Width / height: 3']);
+    expect(shown(0)).toEqual([
+      'Intensity, nits: 500',
+      `Flux, lm: ${500 * Math.PI * 12}`,
+      'Height, m: 2',
+      'Width / height: 3',
+    ]);
     expect(shown(1)).toEqual(['Multiplier: 0.5']);
-    expect(shown(2)).toEqual(['Intensity, cd: 40', 'Radius, m: 0']);
+    expect(shown(2)).toEqual(['Intensity, cd: 40', `Flux, lm: ${160 * Math.PI}`, 'Radius, m: 0']);
     expect(lightOf(lamps(), 1)).toMatchObject({ type: 'ies', color: [1, 0.5, 0] });
     expect(lightOf(lamps(), 3)).toBeUndefined(); // no such light
     for (const node of [0, 1, 2]) {
@@ -39,10 +44,10 @@ describe('lights', () => {
 
   it('get a member that they lack with the objects on the way to it', () => {
     const gltf = lamps();
-    const [strength, radius] = lightOf(gltf, 2)!.fields;
+    const [strength, , radius] = lightOf(gltf, 2)!.fields;
     expect(edits.setLight(gltf, strength!.path, 50)[0]).toMatchObject({ op: 'replace', value: 50 });
     applyPatch(json(gltf), edits.setLight(gltf, radius!.path, 0.1));
-    expect(lightOf(gltf, 2)!.fields[1]!.value).toBe(0.1);
+    expect(lightOf(gltf, 2)!.fields[2]!.value).toBe(0.1);
     expect(edits.setLight(gltf, radius!.path, 0.2)[0]).toMatchObject({ op: 'replace', value: 0.2 });
     expect(edits.describePatch(gltf, edits.setLight(gltf, radius!.path, 0.2))).toContain('light: radius');
   });

@@ -12,6 +12,7 @@ import type { Bookmark, HelloReply, LightmapsNote, Notifications, Progress, Serv
 import { GeometryFetch } from '../scenes/geometry_fetch';
 import { SceneSession } from '../scenes/scene_session';
 import { SkyFetch } from '../scenes/sky_fetch';
+import { WebFetch } from '../scenes/web_fetch';
 import { Share } from '../scenes/share';
 import { Bookmarks } from '../session/bookmarks';
 import { LinkNotice } from '../session/link_notice';
@@ -164,6 +165,8 @@ export class App {
   }
 
   private makeEdit(): EditSession {
+    const { fetch } = this.session.access;
+    const webs = new WebFetch({ fetch, changed: (known) => this.edit.showWebs(known) });
     return new EditSession({
       name: this.session.access.name,
       picture: this.viewer,
@@ -179,9 +182,11 @@ export class App {
       upload: (file) => this.scene.send(file),
       documentChanged: (gltf, isWhole) => {
         this.sky.onDocument(gltf, isWhole);
+        if (isWhole) webs.forget();
         this.planes.refresh();
       },
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
+      webWanted: (gltf, light) => void webs.want(gltf, light),
     });
   }
 

@@ -60,39 +60,10 @@ export function isVisible(gltf: Gltf, node: number): boolean {
   return gltf.nodes?.[node]?.extensions?.KHR_node_visibility?.visible ?? true;
 }
 
-function markUsed(gltf: Gltf, extension: string): Patch {
+export function markUsed(gltf: Gltf, extension: string): Patch {
   if (!gltf.extensionsUsed) return [{ op: 'add', path: '/extensionsUsed', value: [extension] }];
   if (gltf.extensionsUsed.includes(extension)) return [];
   return [{ op: 'add', path: '/extensionsUsed/-', value: extension }];
-}
-
-/**
- * A point light at `translation` (metres) in the shown scene. Lists grow only at their ends, so the indices are known.
- */
-export function addLamp(gltf: Gltf, translation: Vec3, candela: number): { patch: Patch; node: number } {
-  const node = gltf.nodes?.length ?? 0;
-  const lights = gltf.extensions?.KHR_lights_punctual?.lights ?? [];
-  const name = freeName(gltf, 'lamp');
-  const light = { name, type: 'point', color: [1, 1, 1], intensity: candela };
-  const patch = markUsed(gltf, 'KHR_lights_punctual');
-  if (!gltf.extensions) patch.push({ op: 'add', path: '/extensions', value: {} });
-  if (!gltf.extensions?.KHR_lights_punctual)
-    patch.push({ op: 'add', path: '/extensions/KHR_lights_punctual', value: { lights: [light] } });
-  else patch.push({ op: 'add', path: '/extensions/KHR_lights_punctual/lights/-', value: light });
-  if (!gltf.nodes) patch.push({ op: 'add', path: '/nodes', value: [] });
-  patch.push({
-    op: 'add',
-    path: '/nodes/-',
-    value: {
-      name,
-      translation,
-      rotation: [0, 0, 0, 1],
-      scale: [1, 1, 1],
-      extensions: { KHR_lights_punctual: { light: lights.length } },
-    },
-  });
-  patch.push(attach(gltf, `/scenes/${gltf.scene ?? 0}/nodes`, node));
-  return { patch, node };
 }
 
 export function attach(gltf: Gltf, list: string, node: number): Patch[number] {
@@ -205,6 +176,8 @@ function readable(member: string): string {
     emissiveStrength: 'emission',
     translation: 'position',
     radiosityRadius: 'radius',
+    innerConeAngle: 'cone',
+    outerConeAngle: 'cone',
     '-': 'new light',
   };
   return words[member] ?? member;

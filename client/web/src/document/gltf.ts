@@ -85,20 +85,59 @@ export interface Gltf {
   extensions?: {
     KHR_lights_punctual?: { lights: GltfLight[] };
     EXT_lights_area?: { lights: GltfAreaLight[] };
-    EXT_lights_ies?: { lights: { name?: string }[] };
+    EXT_lights_ies?: { lights: { name?: string; bufferView?: number; uri?: string }[] };
     [name: string]: unknown;
   };
   extras?: Json;
 }
 
 /**
+ * The largest scale of a node in the scene, in any direction along its axes, by which area lights grow. Copes with
+ * cycles.
+ */
+export function largestScale(gltf: Gltf, node: number): number {
+  const parents = new Map((gltf.nodes ?? []).flatMap(({ children }, i) => (children ?? []).map((child) => [child, i])));
+  let axes: Vec3[] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ];
+  const seen = new Set<number>();
+  for (let at: number | undefined = node; at !== undefined && !seen.has(at); at = parents.get(at)) {
+    seen.add(at);
+    const own = gltf.nodes?.[at];
+    if (own) axes = axes.map((axis) => placed(own, axis));
+  }
+  return Math.max(...axes.map((axis) => Math.hypot(...axis)));
+}
+
+/** A direction in a node's space, in the space of its parent. */
+function placed({ matrix, rotation = [0, 0, 0, 1], scale = [1, 1, 1] }: GltfNode, axis: Vec3): Vec3 {
+  const of = (row: number) => axis.reduce((sum, v, column) => sum + v * matrix![4 * column + row]!, 0);
+  if (matrix) return [of(0), of(1), of(2)];
+  const v = axis.map((component, i) => component * scale[i]!) as Vec3;
+  const [x, y, z, w] = rotation;
+  const cross = (a: Vec3, b: Vec3): Vec3 => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0],
+  ];
+  const twice = cross([x, y, z], v).map((component) => 2 * component) as Vec3;
+  const more = cross([x, y, z], twice);
+  return v.map((component, i) => component + w * twice[i]! + more[i]!) as Vec3;
+}
+
+/**
  * Whether two documents are of one scene, so that a node's number means the same object in both. At least half of the
- * nodes then have the same names, whatever was edited in between; in two scenes that would be chance.
+ * nodes then have the same names, whatever was edited in between, or one of them begins with all that the other has, as
+ * lists grow at their ends; in two scenes that would be chance.
  */
 export function isSameScene(a: Gltf, b: Gltf): boolean {
   const [left, right] = [a.nodes ?? [], b.nodes ?? []];
   const alike = left.filter(({ name }, i) => i < right.length && (name ?? '') === (right[i]!.name ?? '')).length;
-  return 2 * alike >= Math.max(left.length, right.length);
+  const fewer = left.length < right.length ? left : right;
+  const hasGrown = alike === fewer.length && fewer.some(({ name }) => name);
+  return hasGrown || 2 * alike >= Math.max(left.length, right.length);
 }
 
 export function nodeName(gltf: Gltf, index: number): string {

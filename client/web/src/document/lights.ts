@@ -1,15 +1,20 @@
 // The lights of nodes that are no surfaces: point, spot and directional ones, area lights, and lamps with a photometric
 // web (IES). What the viewer shows of them, and where in the document it lies.
 
-import type { Gltf, GltfAreaLight, GltfLight, Vec3 } from './gltf';
+import { type Gltf, type GltfAreaLight, type GltfLight, largestScale, type Vec3 } from './gltf';
 
 export type LightType = GltfLight['type'] | GltfAreaLight['type'] | 'ies';
 
-/** A number that people may change. `path`: its JSON pointer. */
+/**
+ * A number that people may change. `path`: its JSON pointer. `per`: the document's number is `value` / `per`, as for a
+ * flux in lumens beside an intensity in candela, or degrees beside radians. `most`: the largest that is accepted.
+ */
 export interface LightField {
   label: string;
   path: string;
   value: number;
+  per?: number;
+  most?: number;
 }
 
 export interface NodeLight {
@@ -20,10 +25,29 @@ export interface NodeLight {
   fields: LightField[];
 }
 
+/** A photometric web as the server tells it: /webs/<light>.json. Angles in degrees; candela azimuth by azimuth. */
+export interface LampWeb {
+  lumens: number;
+  candelaMost: number;
+  /** In the node's space: where `polar` is 0, and where `polar` is 90 and `azimuth` 0. */
+  axis: Vec3;
+  across: Vec3;
+  polar: number[];
+  azimuth: number[];
+  candela: number[];
+}
+
+/** By index in EXT_lights_ies; those that are known. */
+export type LampWebs = ReadonlyMap<number, LampWeb>;
+
 const WHITE: Vec3 = [1, 1, 1];
+const NO_WEBS: LampWebs = new Map();
+const DEGREE = Math.PI / 180;
+/** glTF's own: half of the angle of a cone. */
+const OUTER_CONE = Math.PI / 4;
 
 /** The light of a node, if it has one. */
-export function lightOf(gltf: Gltf, node: number): NodeLight | undefined {
+export function lightOf(gltf: Gltf, node: number, webs = NO_WEBS): NodeLight | undefined {
   const {
     KHR_lights_punctual: punctual,
     EXT_lights_area: area,
@@ -32,35 +56,104 @@ export function lightOf(gltf: Gltf, node: number): NodeLight | undefined {
   const { KHR_lights_punctual: lights, EXT_lights_area: areas } = gltf.extensions ?? {};
   if (punctual && lights?.lights[punctual.light])
     return punctualLight(lights.lights[punctual.light]!, `/extensions/KHR_lights_punctual/lights/${punctual.light}`);
-  if (area && areas?.lights[area.light])
-    return areaLight(areas.lights[area.light]!, `/extensions/EXT_lights_area/lights/${area.light}`);
+  if (area && areas?.lights[area.light]) {
+    const path = `/extensions/EXT_lights_area/lights/${area.light}`;
+    return areaLight(areas.lights[area.light]!, path, largestScale(gltf, node));
+  }
   if (!ies) return undefined;
   const path = `/nodes/${node}/extensions/EXT_lights_ies`;
+  const color = ies.color ?? WHITE;
   const multiplier = { label: 'Multiplier', path: `${path}/multiplier`, value: ies.multiplier ?? 1 };
-  return { type: 'ies', color: ies.color ?? WHITE, colorPath: `${path}/color`, fields: [multiplier] };
+  const web = webs.get(ies.light);
+  const fields = [multiplier, ...inUnits(multiplier, 'Flux, lm', (web?.lumens ?? 0) * brightness(color))];
+  return {
+    type: 'ies',
+    color,
+    colorPath: `${path}/color`,
+    fields: [...fields, ...inUnits(multiplier, 'Peak, cd', web?.candelaMost ?? 0)],
+  };
+}
+
+/** Index in EXT_lights_ies of the web that a node shines by. */
+export function webOf(gltf: Gltf, node: number | undefined): number | undefined {
+  const extensions = gltf.nodes?.[node ?? -1]?.extensions;
+  return lightOf(gltf, node ?? -1)?.type === 'ies' ? extensions?.EXT_lights_ies?.light : undefined;
+}
+
+/** A field in another unit, which is `per` times its number; none where that is not known, or 0. */
+function inUnits({ path, value }: LightField, label: string, per: number): LightField[] {
+  return per > 0 ? [{ label, path, value: value * per, per }] : [];
+}
+
+function brightness([r, g, b]: Vec3): number {
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+
+/** Half of the angles of a spot's cones, radians: as KHR_lights_punctual has them, and the server takes them. */
+export function conesOf({ spot = {} }: GltfLight): { inner: number; outer: number } {
+  const outer = Math.min(spot.outerConeAngle ?? OUTER_CONE, Math.PI / 2);
+  return { inner: Math.min(spot.innerConeAngle ?? 0, outer), outer };
+}
+
+/** Lumens for a candela: of a spot the integral of its falloff, whose root rises with the cosine between its cones. */
+function lumensPerCandela(light: GltfLight): number {
+  if (light.type !== 'spot') return 4 * Math.PI;
+  const { inner, outer } = conesOf(light);
+  return 2 * Math.PI * (1 - Math.cos(inner) + (Math.cos(inner) - Math.cos(outer)) / 3);
 }
 
 function punctualLight(light: GltfLight, path: string): NodeLight {
   const unit = light.type === 'directional' ? 'lx' : 'cd';
-  const fields = [{ label: `Intensity, ${unit}`, path: `${path}/intensity`, value: light.intensity ?? 1 }];
-  if (light.type !== 'directional')
+  const color = light.color ?? WHITE;
+  const intensity = { label: `Intensity, ${unit}`, path: `${path}/intensity`, value: light.intensity ?? 1 };
+  const fields: LightField[] = [intensity];
+  if (light.type !== 'directional') {
+    fields.push(...inUnits(intensity, 'Flux, lm', lumensPerCandela(light) * brightness(color)));
     fields.push({
       label: 'Radius, m',
       path: `${path}/extras/radiosityRadius`,
       value: light.extras?.radiosityRadius ?? 0,
+      most: 1e6,
     });
-  return { type: light.type, color: light.color ?? WHITE, colorPath: `${path}/color`, fields };
+  }
+  if (light.type === 'spot') {
+    const { inner, outer } = conesOf(light);
+    const cone = (label: string, member: string, angle: number): LightField => ({
+      label,
+      path: `${path}/spot/${member}`,
+      value: angle / DEGREE,
+      per: 1 / DEGREE,
+      most: 90,
+    });
+    fields.push(cone('Edge at, °', 'outerConeAngle', outer), cone('Full to, °', 'innerConeAngle', inner));
+  }
+  return { type: light.type, color, colorPath: `${path}/color`, fields };
 }
 
-function areaLight(light: GltfAreaLight, path: string): NodeLight {
-  const size = light.type === 'disk' ? 'Diameter, m' : 'Height, m';
-  const fields = [
-    { label: 'Intensity, nits', path: `${path}/intensity`, value: light.intensity ?? 1000 },
-    { label: size, path: `${path}/size`, value: light.size ?? 1 },
+/** Width and height of an area light in metres; of a disc both are its diameter. `scale`: the largest of its node. */
+export function areaSize(light: GltfAreaLight, scale: number): [width: number, height: number] {
+  const size = (light.size ?? 1) * scale;
+  return [light.type === 'rect' ? size * (light.rect?.aspect ?? 1) : size, size];
+}
+
+function areaLight(light: GltfAreaLight, path: string, scale: number): NodeLight {
+  const color = light.color ?? WHITE;
+  const [width, height] = areaSize(light, scale);
+  const area = light.type === 'rect' ? width * height : (Math.PI / 4) * width * height;
+  const intensity = { label: 'Intensity, nits', path: `${path}/intensity`, value: light.intensity ?? 1000 };
+  const fields: LightField[] = [
+    intensity,
+    ...inUnits(intensity, 'Flux, lm', Math.PI * area * brightness(color)),
+    {
+      label: light.type === 'disk' ? 'Diameter, m' : 'Height, m',
+      path: `${path}/size`,
+      value: light.size ?? 1,
+      most: 1e6,
+    },
   ];
   if (light.type === 'rect')
-    fields.push({ label: 'Width / height', path: `${path}/rect/aspect`, value: light.rect?.aspect ?? 1 });
-  return { type: light.type, color: light.color ?? WHITE, colorPath: `${path}/color`, fields };
+    fields.push({ label: 'Width / height', path: `${path}/rect/aspect`, value: light.rect?.aspect ?? 1, most: 1e6 });
+  return { type: light.type, color, colorPath: `${path}/color`, fields };
 }
 
 export type Handle = 'translate' | 'rotate' | 'scale';

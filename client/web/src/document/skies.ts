@@ -3,6 +3,7 @@
 import type { Patch } from '../protocol/messages';
 import type { Gltf } from './gltf';
 import { isObject } from './json_patch';
+import { addFile } from './new_lamps';
 
 const EXTENSIONS = ['EXT_lights_image_based', 'KHR_environment_map'] as const;
 
@@ -45,13 +46,10 @@ export function setSkyTurn(member: keyof SkyTurn, value: number): Patch {
 
 /** Another picture, which was uploaded; it is turned, and as strong, as the one before it. */
 export function setSkyPicture(gltf: Gltf, uri: string, bytes: number): Patch {
-  const { buffers, bufferViews } = gltf as { buffers?: unknown[]; bufferViews?: unknown[] };
-  const lists = [...(buffers ? [] : ['buffers']), ...(bufferViews ? [] : ['bufferViews'])];
+  const { bufferViews } = gltf as { bufferViews?: unknown[] };
   const sky = { ...skyTurn(gltf), bufferView: bufferViews?.length ?? 0 };
   return [
-    ...lists.map((list) => ({ op: 'add' as const, path: `/${list}`, value: [] })),
-    { op: 'add', path: '/buffers/-', value: { uri, byteLength: bytes } },
-    { op: 'add', path: '/bufferViews/-', value: { buffer: buffers?.length ?? 0, byteLength: bytes } },
+    ...addFile(gltf, { uri, bytes }),
     ...(isObject(gltf.extras) ? [] : [{ op: 'add' as const, path: '/extras', value: {} }]),
     { op: 'add', path: '/extras/radiositySky', value: sky },
   ];

@@ -2,8 +2,9 @@
 
 import type { Object3D } from 'three';
 import * as edits from '../document/edits';
-import { type Gltf, hangingNodes, isSameScene, nodeName } from '../document/gltf';
-import { handlesOf, lightOf } from '../document/lights';
+import { type Gltf, hangingNodes, isSameScene, nodeName, type Vec3 } from '../document/gltf';
+import { handlesOf, lightOf, webOf, type LampWebs } from '../document/lights';
+import { addLamp, MOST_PROFILE_BYTES, profileType, type NewLamp } from '../document/new_lamps';
 import { addPlane, planeOf } from '../document/planes';
 import { setSkyPicture, setSkyTurn } from '../document/skies';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
@@ -11,17 +12,21 @@ import type { Patch, ScenePatchedNote } from '../protocol/messages';
 import { type PageName, shownName } from '../protocol/page_name';
 import { RpcError } from '../protocol/rpc';
 import type { Frame } from '../ui/frame';
+import type { PlainLamp } from '../ui/lamp_section';
 import { ScenePanel, type Selection } from '../ui/scene_panel';
 import type { GizmoMode } from '../view/controls/gizmo';
 import type { Viewer } from '../view/viewer';
-import { lampAhead, placementOf, planeOver, written } from './placement';
+import { lampAhead, lampLike, placementOf, planeOver, written } from './placement';
 
 const HANDLES: readonly GizmoMode[] = ['translate', 'rotate', 'scale'];
 const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
 
 export interface EditHost {
   name: Pick<PageName, 'isMine'>;
-  picture: Pick<Viewer, 'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'invalidate' | 'boxOf'>;
+  picture: Pick<
+    Viewer,
+    'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'showWebs' | 'invalidate' | 'boxOf'
+  >;
   frame: Pick<Frame, 'toasts' | 'setGizmo' | 'showTab' | 'panelOpen'>;
   send: SendEdit;
   /** The steps of undo are others, or `document.lastEdit` is another. */
@@ -34,7 +39,12 @@ export interface EditHost {
   /** `isWhole`: it has come from the server, maybe as another one. */
   documentChanged(gltf: Gltf, isWhole: boolean): void;
   notAccepted(text: string, wanted: string): void;
+  /** The web of EXT_lights_ies that the selected lamp shines by; undefined: nothing like that is selected. */
+  webWanted(gltf: Gltf, light: number | undefined): void;
 }
+
+/** Letters of a file's name that its lamp gets. */
+const MOST_NAME = 60;
 
 export class EditSession {
   readonly panel: ScenePanel;
@@ -69,7 +79,8 @@ export class EditSession {
       setVisible: (node, visible) =>
         this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),
       remove: (node) => this.remove(node),
-      addLamp: () => void this.addLamp(),
+      addLamp: (type) => void this.addLamp(type),
+      addProfile: (file) => void this.addProfile(file),
       frameSelection: () => host.frameSelection(),
       endGesture: () => this.document.endGesture(),
       loadFile: (file) => host.loadFile(file),
@@ -105,8 +116,19 @@ export class EditSession {
     this.host.picture.select(this.isPictureOld ? undefined : selection?.node);
     this.offerHandles();
     this.panel.setSelection(selection);
+    this.wantWeb();
     if (selection && this.host.frame.panelOpen)
       this.host.frame.showTab(planeOf(this.document.gltf, selection.node) ? 'Measure' : 'Scene');
+  }
+
+  /** The photometric webs that are known: the selected lamp's flux is known with its own. */
+  showWebs(webs: LampWebs): void {
+    this.host.picture.showWebs(webs);
+    this.panel.setWebs(webs);
+  }
+
+  private wantWeb(): void {
+    this.host.webWanted(this.document.gltf, webOf(this.document.gltf, this.selection?.node));
   }
 
   /** The document is of another scene than the picture, so the numbers of nodes mean different objects in the two. */
@@ -193,11 +215,35 @@ export class EditSession {
     return { label: `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`, key: `${mode} ${node}` };
   }
 
-  async addLamp(): Promise<void> {
+  async addLamp(type: PlainLamp = 'point'): Promise<void> {
+    const ahead = this.ahead();
+    if (ahead) await this.add(ahead.place, lampLike(type, ahead.candela, ahead.reach));
+  }
+
+  /** A lamp that shines by a photometric file. */
+  async addProfile(file: File): Promise<void> {
+    const { toasts } = this.host.frame;
+    if (file.size > MOST_PROFILE_BYTES || file.size === 0)
+      return toasts.show(`${file.name}: a photometric file has 1 byte to 16 MiB`, 'bad');
+    try {
+      const uri = await this.host.upload(file);
+      const ahead = this.ahead();
+      const profile = { uri, bytes: file.size, mimeType: profileType(file.name) };
+      const name = file.name.replace(/\.[^.]*$/, '').slice(0, MOST_NAME);
+      if (ahead) await this.add(ahead.place, { type: 'ies', name, file: profile });
+    } catch (error) {
+      toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  /** Where a new lamp goes, and how bright it is to be; undefined: there is no picture. */
+  private ahead(): ReturnType<typeof lampAhead> | undefined {
     const { rig, exposure, shown } = this.host.picture;
-    if (!shown) return;
-    const { place, candela } = lampAhead(rig.camera, rig.target, shown.bounds, exposure.ofLeaving);
-    const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
+    return shown && lampAhead(rig.camera, rig.target, shown.bounds, exposure.ofLeaving);
+  }
+
+  private async add(place: Vec3, lamp: NewLamp): Promise<void> {
+    const { patch, node } = addLamp(this.document.gltf, place, lamp);
     try {
       await this.document.edit('Add lamp', patch);
       this.select({ node, material: undefined });
@@ -258,6 +304,7 @@ export class EditSession {
       const hangs = hangingNodes(gltf).some(({ node }) => node === this.selection?.node);
       if (this.selection && !hangs) this.select(undefined); // somebody has removed the object
       this.offerHandles(); // the edit may have changed the kind of a lamp
+      this.wantWeb();
       this.panel.refresh();
     }
   }

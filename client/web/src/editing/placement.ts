@@ -3,6 +3,7 @@
 import { Vector3, type Box3, type Object3D, type PerspectiveCamera } from 'three';
 import type { Placement } from '../document/edits';
 import type { Vec3, Vec4 } from '../document/gltf';
+import type { NewLamp } from '../document/new_lamps';
 import type { PlaneSpec } from '../document/planes';
 import type { GizmoMode } from '../view/controls/gizmo';
 
@@ -25,6 +26,19 @@ export function placementOf({ position, quaternion, scale }: Object3D): Placemen
   };
 }
 
+/** Area lights, as a part of the distance at which they are to light a wall; their steepest edge of spots. */
+const PANEL = 0.3;
+const SPOT = { innerConeAngle: 0.35, outerConeAngle: 0.7 };
+
+/** A lamp of this kind that lights a wall as brightly as one of `candela` does. `reach`: from there, metres. */
+export function lampLike(type: Exclude<NewLamp['type'], 'ies'>, candela: number, reach: number): NewLamp {
+  if (type === 'point') return { type, candela };
+  if (type === 'spot') return { type, candela, ...SPOT };
+  const size = Number((PANEL * reach).toPrecision(2));
+  const area = type === 'rect' ? size * size : (Math.PI / 4) * size * size;
+  return { type, nits: Number((candela / area).toPrecision(2)), size };
+}
+
 /**
  * A lamp in front of the camera, three quarters of the way to the point that the camera looks at, and within the scene.
  * `exposure`: the factor by which the picture shows radiance. The lamp is as bright as the scene is exposed for.
@@ -34,14 +48,14 @@ export function lampAhead(
   target: Vector3,
   bounds: Box3,
   exposure: number,
-): { place: Vec3; candela: number } {
+): { place: Vec3; candela: number; reach: number } {
   const eye = camera.position;
   const at = eye.clone().addScaledVector(camera.getWorldDirection(new Vector3()), 0.75 * eye.distanceTo(target));
   bounds.clampPoint(at, at);
   // A grey wall would be a middle grey at a quarter of the scene's size away from the lamp.
   const reach = bounds.getSize(new Vector3()).length() / 4;
   const candela = Number(((0.5 * Math.PI * reach * reach) / exposure).toPrecision(2));
-  return { place: at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3, candela };
+  return { place: at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3, candela, reach };
 }
 
 /** Metres: of a working plane above the floor, of the band along walls that is left out, and of what is no room. */

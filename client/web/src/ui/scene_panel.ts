@@ -3,13 +3,14 @@
 import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
 import { hangingNodes, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
-import { handlesOf, lightOf, type Handle, type LightType, type NodeLight } from '../document/lights';
+import { handlesOf, lightOf, type Handle, type LampWebs, type NodeLight } from '../document/lights';
 import type { Placement } from '../document/edits';
 import { fromHex, toHex } from '../page/colours';
 import { button, buttons, panel, checkbox, field, h, row, section } from '../page/dom';
 import { parseNumber } from '../page/numbers';
 import type { SkyTurn } from '../document/skies';
 import { emissionFields, emissionWritten } from './emission_fields';
+import { addLampButtons, lightEditor, type LampActions } from './lamp_section';
 import { SkyFields } from './sky_fields';
 
 export interface Selection {
@@ -17,15 +18,13 @@ export interface Selection {
   material: number | undefined;
 }
 
-export interface ScenePanelActions {
+export interface ScenePanelActions extends LampActions {
   select(selection: Selection | undefined): void;
   setColour(material: number, rgb: Vec3): void;
   setEmission(material: number, rgb: Vec3, strength: number): void;
-  setLight(path: string, value: Vec3 | number): void;
   setPlacement(node: number, placement: Placement): void;
   setVisible(node: number, visible: boolean): void;
   remove(node: number): void;
-  addLamp(): void;
   frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
@@ -39,9 +38,6 @@ const MOST_LISTED = 400;
 /** So many objects need no search field. */
 const FEW = 12;
 const MOST_LETTERS = 200;
-
-/** Names for people of lights that the format has another one for. */
-const LIGHT_NAMES: Partial<Record<LightType, string>> = { rect: 'rectangle', disk: 'disc', ies: 'IES' };
 
 /** A number for a narrow field: four digits; hundredths of large numbers; 0 where rounding has left less than that. */
 export function briefly(value: number): string {
@@ -72,10 +68,13 @@ export class ScenePanel {
   private readonly editor = h('div', { class: 'editor' });
   private gltf: Gltf = { asset: { version: '2.0' } };
   private selection: Selection | undefined;
+  private webs: LampWebs = new Map();
   private revealed: number | undefined;
   private edited: number | undefined;
   /** The user is writing a value that was not sent yet. */
   private typing = false;
+  /** The document has changed while the user was writing. */
+  private stale = false;
   private materialsOf: (node: number) => number[] = () => [];
   private readonly sky: SkyFields;
 
@@ -92,8 +91,8 @@ export class ScenePanel {
         'Objects',
         this.findRow,
         this.list,
+        addLampButtons(actions),
         buttons(
-          button('Add lamp', () => actions.addLamp(), { title: 'Add a point light in front of the camera (L)' }),
           button('Open scene…', () => file.click(), { title: 'Or drop a .glb on the page' }),
           file,
         ),
@@ -108,7 +107,11 @@ export class ScenePanel {
     this.editor.addEventListener('click', ({ target }) => {
       if ((target as HTMLInputElement).type === 'color') this.typing = true;
     });
-    this.editor.addEventListener('change', () => (this.typing = false));
+    this.editor.addEventListener('change', () => {
+      this.typing = false;
+      // A value that was just sent may change others, such as a lamp's flux with its size.
+      if (this.stale) this.showEditor();
+    });
     // The list cannot scroll to the selection while another tab is open.
     new ResizeObserver(() => this.revealSelection()).observe(this.list);
   }
@@ -124,6 +127,12 @@ export class ScenePanel {
     this.refresh();
   }
 
+  /** Photometric webs that are known: with its own a lamp's flux is. */
+  setWebs(webs: LampWebs): void {
+    this.webs = webs;
+    this.refresh();
+  }
+
   /**
    * Shows the document as it is after everyone's edits and after refusals. A value that the user is typing, and a
    * colour that the user is choosing, stay as they are.
@@ -131,7 +140,8 @@ export class ScenePanel {
   refresh(): void {
     this.showList();
     this.sky.show(this.gltf);
-    if (!this.typing || !this.editor.contains(document.activeElement)) this.showEditor();
+    this.stale = this.typing && this.editor.contains(document.activeElement);
+    if (!this.stale) this.showEditor();
   }
 
   private showList(): void {
@@ -194,7 +204,7 @@ export class ScenePanel {
     const controls = () => [...this.editor.querySelectorAll<HTMLElement>('input, button')];
     const at = controls().indexOf(document.activeElement as HTMLElement);
     const [before, node] = [this.edited, this.selection?.node];
-    this.typing = false;
+    this.typing = this.stale = false;
     this.fillEditor();
     this.edited = node;
     if (at >= 0 && before === node) controls()[at]?.focus({ preventScroll: true });
@@ -207,7 +217,7 @@ export class ScenePanel {
       this.editor.replaceChildren(h('p', { class: 'dim' }, 'Click an object to edit it.'));
       return;
     }
-    const light = lightOf(gltf, selection.node);
+    const light = lightOf(gltf, selection.node, this.webs);
     const materials = this.materialsOf(selection.node);
     const material = selection.material ?? materials[0];
     this.editor.replaceChildren(
@@ -223,7 +233,7 @@ export class ScenePanel {
           button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
         ),
       ),
-      ...(light ? [this.lightEditor(light)] : []),
+      ...(light ? [this.lightSection(light)] : []),
       ...(material !== undefined && gltf.materials?.[material] ? [this.materialEditor(material, materials)] : []),
     );
   }
@@ -314,17 +324,9 @@ export class ScenePanel {
     );
   }
 
-  private lightEditor(light: NodeLight): HTMLElement {
+  private lightSection(light: NodeLight): HTMLElement {
     const colour = this.colour(toHex(light.color), (hex) => this.actions.setLight(light.colorPath, fromHex(hex)));
-    const rows = light.fields.map(({ label, path, value }) => {
-      const input = this.number(String(Number(value.toPrecision(5))), () => {
-        const wanted = parseNumber(input.value);
-        if (wanted >= 0) this.actions.setLight(path, wanted);
-        else this.refuse(input, 'a number, 0 or more');
-      });
-      return field(label, input);
-    });
-    return section(`Light: ${LIGHT_NAMES[light.type] ?? light.type}`, field('Colour', colour), ...rows);
+    return lightEditor(light, colour, this.actions, (input, wanted) => this.refuse(input, wanted));
   }
 
   /** Restores the field's last good value. */

@@ -12,6 +12,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { Gltf } from '../document/gltf';
+import type { LampWebs } from '../document/lights';
 import { pause } from '../page/pause';
 import type { MeasuredPlane, Sky } from '../protocol/messages';
 import { Brightness } from './exposure/brightness';
@@ -255,8 +256,15 @@ export class Viewer {
   }
 
   select(node: number | undefined): void {
+    this.layouts.selectLamp(node);
     this.gizmo.attach(node === undefined ? undefined : this.objectOf(node));
     this.moved();
+  }
+
+  /** The photometric webs that are known: a selected lamp shows its own. */
+  showWebs(webs: LampWebs): void {
+    this.layouts.showWebs(webs);
+    this.invalidate();
   }
 
   /** The box to frame for a node, in metres: around its surfaces, or the surroundings of a lamp without surfaces. */
@@ -284,7 +292,7 @@ export class Viewer {
 
   /** A new lamp has a marker before the geometry has its node. */
   private objectOf(node: number): Object3D | undefined {
-    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node) ?? this.shown?.planes.get(node);
+    return this.shown?.nodes.get(node) ?? this.shown?.lamps.anchorOf(node) ?? this.shown?.planes.get(node);
   }
 
   private frame(now: number): void {
@@ -366,7 +374,7 @@ export class Viewer {
 
   private setSigns(visible: boolean): void {
     this.gizmo.setVisible(visible && !this.mode?.flat);
-    for (const lamp of this.shown?.lamps.values() ?? []) lamp.visible = visible;
+    this.shown?.lamps.setVisible(visible);
     this.shown?.planes.setVisible(visible);
     if (this.people) this.people.root.visible = visible;
   }

@@ -132,9 +132,27 @@ TEST(Ies, TypesAAndBLieOnTheirSides) {
   ies.vertical = {0, 90};
   ies.candela = {5, 6, 8, 9};
   const auto mirrored = parsed(ies.text());
+  EXPECT_THAT(mirrored.warnings, testing::ElementsAre(HasSubstr("vertical angles begin at 0")));
   EXPECT_FLOAT_EQ(at(mirrored, 90, 90), 6);
   EXPECT_FLOAT_EQ(at(mirrored, 90, -90), 6);
   EXPECT_FLOAT_EQ(at(mirrored, 180, 0), 8);
+}
+
+TEST(Ies, TypesAAndBThatEndBefore90AreDarkBeyond) {
+  Ies ies;
+  ies.type = 3;
+  ies.vertical = {-30, 0, 30};
+  ies.horizontal = {0, 40};
+  ies.candela = {1, 2, 3, 4, 5, 6};
+  const auto file = parsed(ies.text());
+  EXPECT_THAT(file.warnings, testing::ElementsAre(HasSubstr("dark beyond them")));
+  EXPECT_FLOAT_EQ(at(file, 90, 0), 2);
+  EXPECT_FLOAT_EQ(at(file, 90, -40), 5);
+  EXPECT_FLOAT_EQ(at(file, 60, 40), 6);
+  EXPECT_FLOAT_EQ(at(file, 59, 0), 0);
+  EXPECT_FLOAT_EQ(at(file, 90, 41), 0);
+  ies.vertical = {10, 20, 30};
+  EXPECT_THAT(refusal(ies.text()), HasSubstr("must go from -90 or 0 to 90"));
 }
 
 TEST(Ies, MultiplierAndBallastCountAndTheSecondFactorOnlyBefore2002) {
@@ -159,6 +177,13 @@ TEST(Ies, MoreLumensThanTheLampsHaveIsSaid) {
   EXPECT_TRUE(parsed(ies.text()).warnings.empty());
   ies.lumens = "1000";
   EXPECT_THAT(parsed(ies.text()).warnings, testing::Contains(HasSubstr("1257 lm, more than the 1000 lm")));
+  ies.lumens = "12000";  // a tenth: a luminaire may well swallow so much
+  EXPECT_TRUE(parsed(ies.text()).warnings.empty());
+  ies.lumens = "13000";
+  EXPECT_THAT(parsed(ies.text()).warnings,
+              testing::Contains(HasSubstr("1257 lm, less than a tenth of the 1.3e+04 lm of its lamps")));
+  ies.lumens = "-1";
+  EXPECT_TRUE(parsed(ies.text()).warnings.empty()) << "absolute photometry states no lumens";
 }
 
 TEST(Ies, TiltThatIsIncludedIsReadPast) {

@@ -4,6 +4,7 @@
 
 import type { WebGLRenderer } from 'three';
 import type { Gltf } from '../../document/gltf';
+import type { LampWebs } from '../../document/lights';
 import type { LightmapsNote, MeasuredPlane } from '../../protocol/messages';
 import { LightmapSet } from '../light/lightmap_set';
 import type { LitScene } from './lit_scene';
@@ -28,6 +29,8 @@ export class Layouts {
   private isKnown = true;
   /** The scene's document as it is now. */
   private document: Gltf = { asset: { version: '2.0' } };
+  private lamp: number | undefined;
+  private webs: LampWebs = new Map();
   private measured: { planes: readonly MeasuredPlane[]; document: Gltf } | undefined;
 
   constructor(
@@ -86,6 +89,18 @@ export class Layouts {
     this.document = document;
     this.shown?.applyPointers(document, pointers);
     this.stagedScene?.applyPointers(document, pointers);
+  }
+
+  /** The lamp of a node shows more of itself; undefined: none does. */
+  selectLamp(node: number | undefined): void {
+    this.lamp = node;
+    this.shown?.selectLamp(node, this.webs, this.document);
+  }
+
+  /** The photometric webs that are known. */
+  showWebs(webs: LampWebs): void {
+    this.webs = webs;
+    this.selectLamp(this.lamp);
   }
 
   /** The document may have been edited since the scene's geometry was made. */

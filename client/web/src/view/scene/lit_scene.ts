@@ -17,8 +17,9 @@ import {
 import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { isVisible } from '../../document/edits';
 import type { Gltf, GltfNode, GltfTextureInfo, SpecularGlossiness } from '../../document/gltf';
-import { lightOf } from '../../document/lights';
+import type { LampWebs } from '../../document/lights';
 import { LampMarker } from './lamp_marker';
+import { LampMarkers } from './lamp_markers';
 import { LitMaterial, readSpecularGlossiness, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from '../light/lightmap_set';
 import { isSign, trianglesOf } from './object_box';
@@ -34,7 +35,7 @@ export class LitScene {
   /** The document of the GLB that the scene was made from. */
   readonly source: Gltf;
   readonly nodes = new Map<number, Object3D>();
-  readonly lamps = new Map<number, LampMarker>();
+  readonly lamps = new LampMarkers();
   readonly planes = new PlaneMarkers();
   readonly cameras: { name: string; camera: PerspectiveCamera }[] = [];
   triangles = 0;
@@ -106,6 +107,12 @@ export class LitScene {
     this.placeSigns(gltf);
   }
 
+  /** The lamp of this node, if it is one, shows more of itself. `webs`: those that are known. */
+  selectLamp(node: number | undefined, webs: LampWebs, gltf: Gltf): void {
+    this.lamps.select(node, webs);
+    this.placeSigns(gltf);
+  }
+
   /** The node that an object belongs to. */
   nodeOf(object: Object3D): number | undefined {
     for (let at: Object3D | null = object; at; at = at.parent) {
@@ -145,7 +152,7 @@ export class LitScene {
     for (const geometry of this.geometries) geometry.dispose();
     for (const texture of this.textures) texture.dispose();
     for (const material of this.made.values()) material.dispose();
-    for (const lamp of this.lamps.values()) lamp.destroy();
+    this.lamps.dispose();
     this.planes.dispose();
     this.root.removeFromParent();
   }
@@ -205,42 +212,8 @@ export class LitScene {
   }
 
   private placeSigns(gltf: Gltf): void {
-    this.placeLamps(gltf);
+    this.lamps.place(gltf, this.nodes, this.root, this.bounds.getSize(new Vector3()).length());
     this.planes.place(gltf, this.nodes, this.root);
-  }
-
-  /** Lights without a surface get a small sign that can be picked and dragged. */
-  private placeLamps(gltf: Gltf): void {
-    const hanging = new Set(this.hangingLights(gltf));
-    for (const [node, marker] of this.lamps) {
-      if (hanging.has(node)) continue;
-      marker.destroy();
-      this.lamps.delete(node);
-    }
-    const size = this.bounds.getSize(new Vector3()).length() * 0.012;
-    for (const node of hanging) {
-      let marker = this.lamps.get(node);
-      const parent = this.nodes.get(node) ?? this.root;
-      if (!marker) {
-        marker = new LampMarker(node);
-        this.lamps.set(node, marker);
-      }
-      if (marker.parent !== parent) parent.add(marker);
-      // A new lamp that the geometry does not contain yet hangs in the root.
-      if (parent === this.root) place(marker, gltf.nodes?.[node] ?? {});
-      marker.display(lightOf(gltf, node)!, size);
-    }
-  }
-
-  private hangingLights(gltf: Gltf): number[] {
-    const out: number[] = [];
-    const visit = (node: number, depth: number) => {
-      if (depth > 64 || !isVisible(gltf, node)) return;
-      if (lightOf(gltf, node)) out.push(node);
-      for (const child of gltf.nodes?.[node]?.children ?? []) visit(child, depth + 1);
-    };
-    for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? []) visit(root, 0);
-    return out;
   }
 }
 
