@@ -26,8 +26,7 @@ double LightGatherer::delivered() const {
   return delivered;
 }
 
-/// As LinkColumn::gain, for one shot. What glass stops is another part of the light at each angle, and its area is that
-/// of light from all around: what such leaves are delivered is not what the others lack.
+/// As LinkColumn::gain, for one shot.
 double LightGatherer::conserve(double area, double kept) const {
   if (kept < kClosed || receivers_->hasGlass()) return 1.0;
   const double sum = delivered();
@@ -76,7 +75,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   const double kept = 1.0 - escaped - absorbed;
   findVisibility(0, look_count_);
   sample.delivered = delivered();
-  sample.due = kept * area;
+  sample.due = receivers_->hasGlass() ? sample.delivered : kept * area;
   sample.runs.clear();
   sample.irradiance.resize(lit_count_);
   float* irradiance = sample.irradiance.data();

@@ -39,7 +39,7 @@ std::size_t countReceivers(const scene::PatchScene& patches) {
 
 Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
     : patches_(std::move(patches)), rays_(std::make_unique<Rays>()) {
-  has_glass_ = std::ranges::any_of(patches_->surfaces, [](const auto& surface) { return surface.glass.isGlass(); });
+  has_glass_ = patches_->hasGlass();
   const auto count = countReceivers(*patches_);
   receivers_.reserve(count);
   for (auto* texels : {&texel_x_, &texel_y_}) texels->reserve(count);

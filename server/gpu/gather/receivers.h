@@ -202,7 +202,7 @@ class Receivers {
   static constexpr float kFar = 4.0F;
 
   /// Whether the item is of a surface that lets light through somewhere.
-  /// Whether any surface of the scene is glass.
+  /// PatchScene::hasGlass().
   [[nodiscard]] bool hasGlass() const { return has_glass_; }
   [[nodiscard]] bool isSeeThrough(std::uint32_t item) const {
     return item != scene::kNone && patches_->surfaces[patches_->triangle_surface[item]].see_through;

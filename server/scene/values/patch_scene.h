@@ -8,6 +8,7 @@
 // geometry: each has nodes and texels of its own wherever light may reach it (lit_sides.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -183,6 +184,13 @@ struct PatchScene {
     if (!surface.glass.isGlass()) return opacity;
     const float along = glm::dot(triangles[triangle].normal, direction);
     return surface.glass.stopped(opacity, GlassFace::edgeOf(std::abs(along) / glm::length(direction)));
+  }
+
+  /// Whether any surface is glass: what it stops depends on the angle, while its leaves' area is that of light from all
+  /// around, so that what leaves are delivered does not add up to what is sent. O(surfaces).
+  [[nodiscard]] bool hasGlass() const {
+    return std::any_of(surfaces.begin(), surfaces.end(),
+                       [](const Surface& surface) { return surface.glass.isGlass(); });
   }
 
   /// Of triangles that lie in one place and face the same way that of least order is seen: what emits first, so that no

@@ -335,7 +335,7 @@ void CrowdSample::findLost(LinkSample& links) const {
   }
   links.escaped = crowd_.area * escaped / kLostRays;
   links.absorbed = crowd_.area * absorbed / kLostRays;
-  if (escaped + absorbed == 0) links.due = crowd_.area;
+  if (escaped + absorbed == 0 && !patches_.hasGlass()) links.due = crowd_.area;
 }
 
 LinkSample CrowdSample::links() const {
