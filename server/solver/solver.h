@@ -125,8 +125,8 @@ class Solver {
   [[nodiscard]] virtual EnergyParts energy() const = 0;
   /// Whether light goes by way of mirrors, metal and glass at all.
   [[nodiscard]] virtual bool showsMirrors() const { return false; }
-  /// Flux, all channels, that mirrors, metal and glass reflect of the light of lamps that are no surfaces. It leaves as
-  /// if it was diffuse: rays do not find these lamps in mirrors.
+  /// Flux, all channels, that mirrors and metal reflect of the light of lamps that are no surfaces. It leaves as if it
+  /// was diffuse: rays do not find these lamps in mirrors. What glass reflects of them is left out.
   [[nodiscard]] virtual double spreadByMirrors() const { return 0.0; }
   /// What leaves are asked by that see by rays, made now where it is not there yet; null: this solver has none.
   [[nodiscard]] virtual std::shared_ptr<const LeafRays> rays() { return nullptr; }

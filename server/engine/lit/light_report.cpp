@@ -240,7 +240,7 @@ void tellMirrors(const LitParts& parts, const solver::Solver& solver, double emi
   const double spread = solver.spreadByMirrors();
   if (!(spread > kMuchInMirrors * emitted)) return;
   warnings.push_back(fmt::format(
-      "{:.1f} % of all light is what mirrors, metal and glass reflect straight from point, spot, area and "
+      "{:.1f} % of all light is what mirrors and metal reflect straight from point, spot, area and "
       "directional lights, suns and bright skies: it is spread as by a rough surface, since rays do not find "
       "these in mirrors; emissive surfaces instead of lights are reflected as they are",
       100.0 * spread / emitted));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/scene/shading/emitters.h"
+#include "server/scene/shading/opacity.h"
 #include "server/scene/shading/specular.h"
 
 namespace radiosity::engine {
@@ -29,17 +30,24 @@ bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse us
 
 /// Which sides a surface has, and where one can see through it.
 bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material& n) {
-  if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode || scene::passedPart(m) != scene::passedPart(n))
+  if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode ||
+      scene::passedPart(m) != scene::passedPart(n) || scene::isSeeThrough(m) != scene::isSeeThrough(n) ||
+      scene::glassFace(m) != scene::glassFace(n))
     return false;
   if (m.alpha_mode == AlphaMode::kOpaque) return true;
   return m.alpha == n.alpha && m.alpha_cutoff == n.alpha_cutoff &&
          sameTexture(a, m.base_color_texture, b, n.base_color_texture);
 }
 
+/// Of what reflects as a mirror does; nothing else depends on it.
+bool sameGloss(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  if (!scene::isSpecular(m) && !scene::isSpecular(n)) return true;
+  return m.roughness == n.roughness && m.ior == n.ior && sameTexture(a, m.roughness_texture, b, n.roughness_texture);
+}
+
 bool sameShading(const Scene& a, const Material& m, const Scene& b, const Material& n) {
   return m.base_color == n.base_color && m.transmission == n.transmission && m.attenuation == n.attenuation &&
-         m.metallic == n.metallic && m.specular == n.specular && m.roughness == n.roughness && m.ior == n.ior &&
-         m.emission == n.emission && sameTexture(a, m.roughness_texture, b, n.roughness_texture) &&
+         m.metallic == n.metallic && m.specular == n.specular && sameGloss(a, m, b, n) && m.emission == n.emission &&
          sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
          sameTexture(a, m.metallic_texture, b, n.metallic_texture) &&
          sameTexture(a, m.specular_texture, b, n.specular_texture) &&

@@ -224,7 +224,9 @@ Receivers::Meeting Receivers::opacityAt(std::uint32_t triangle, const glm::vec2&
   const auto& surface = patches_->surfaces[patches_->triangle_surface[triangle]];
   if (!surface.see_through) return Meeting::kSolid;
   const auto opacity = patches_->opacityAt(surface, texel);
-  return opacity == 0 ? Meeting::kNothing : opacity == 255 ? Meeting::kSolid : Meeting::kChance;
+  return opacity == 0 && !surface.glass.isGlass() ? Meeting::kNothing
+         : opacity == 255                         ? Meeting::kSolid
+                                                  : Meeting::kChance;
 }
 
 bool Receivers::hidesAtEdge(std::uint32_t item, const Ray& ray) const {

@@ -91,7 +91,8 @@ class MaterialImporter {
     out.metallic = unit(source.pbrMetallicRoughness.metallicFactor);
     out.roughness = clampedRoughness(source.pbrMetallicRoughness.roughnessFactor);
     const auto* member = "/pbrMetallicRoughness/metallicRoughnessTexture";
-    if (out.metallic == 0.0F) return {};  // a picture is not read for the roughness of a coat alone
+    // A picture is not read for the roughness of a coat alone.
+    if (out.metallic == 0.0F && extensionOf(json, "KHR_materials_transmission") == nullptr) return {};
     if (auto ok = readTexture(json, member, Coding::kLinear, out.metallic_texture); !ok) return ok;
     foldMetallic(out);
     return {};
@@ -112,7 +113,7 @@ class MaterialImporter {
     } else {
       out.roughness *= data_->mean_green;
     }
-    if (data_->blue) out.metallic_texture = {};
+    if (data_->blue || out.metallic <= 0.0F) out.metallic_texture = {};
   }
 
   /// KHR_materials_pbrSpecularGlossiness, which comes before pbrMetallicRoughness where a material has both.

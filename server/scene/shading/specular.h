@@ -41,7 +41,8 @@ inline constexpr float kLeastSpecular = 0.05F;
 [[nodiscard]] inline GlassFace glassFace(const Material& material) {
   if (!isGlass(material)) return {};
   constexpr float kAll = 0.999F;
-  return {facingReflectance(material.ior), !material.double_sided && material.transmission >= kAll};
+  const bool only_passes = material.transmission >= kAll && material.emission == glm::vec3(0.0F);
+  return {facingReflectance(material.ior), !material.double_sided && only_passes};
 }
 
 /// Part of the light that enters a face, by luminance, that goes on through it.
@@ -50,7 +51,10 @@ inline constexpr float kLeastSpecular = 0.05F;
   const glm::vec3 tint =
       material.base_color * glm::sqrt(material.attenuation);  // the other half is that of another face
   const float bright = glm::dot(tint, glm::vec3(0.2126F, 0.7152F, 0.0722F));
-  return std::clamp(material.transmission * (1.0F - material.metallic) * bright, 0.0F, 1.0F);
+  // Of a mask of metal that varies nobody knows here where it is; the factor alone is often 1 for all of it.
+  const float metallic = material.metallic_texture.texture == kNone ? material.metallic : 0.0F;
+  const float shine = std::max({material.specular.r, material.specular.g, material.specular.b});
+  return std::clamp(material.transmission * (1.0F - metallic) * (1.0F - shine) * bright, 0.0F, 1.0F);
 }
 
 /// Part of the light straight at a face, by luminance, that goes on through it.

@@ -89,7 +89,8 @@ std::vector<glm::vec3> LinkedSolver::spreadLight() const {
   for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
   for (std::uint32_t value = 0; value < light[0].size(); ++value) {
     const auto arriving = 0.5F * (light[0][value] + light[1][value]);
-    light[0][value] = mirrors_->has(value) ? mirrors_->meanReflectance(value) * arriving : glm::vec3(0.0F);
+    const bool spreads = mirrors_->has(value) && !mirrors_->isGlass(value);
+    light[0][value] = spreads ? mirrors_->meanReflectance(value) * arriving : glm::vec3(0.0F);
   }
   return std::move(light[0]);
 }

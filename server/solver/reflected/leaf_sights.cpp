@@ -214,6 +214,7 @@ std::uint32_t LeafSights::endOfRay(const LeafRays::Place& place, const glm::dvec
 /// Those that met a leaf that goes on otherwise now, or ended there.
 void LeafSights::reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) {
   if (leaf_count_ >= SpecularStep::kMostLeaves) mirrors = nullptr;
+  if (!mirrors && !mirrors_) return;
   std::vector<bool> differs;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     if (SpecularLeaves::goOnAlike(mirrors.get(), value, mirrors_.get(), value)) continue;

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "common/parallel.h"
+#include "common/task.h"
 #include "server/solver/lamps/unhidden.h"
 #include "server/solver/math/microfacets.h"
 #include "server/solver/math/polygon_form_factor.h"
@@ -30,6 +31,8 @@ constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
 constexpr std::size_t kMostSteps = 8;
 constexpr std::uint64_t kSpreadSeed = 0x5bd1e995;
+/// Shadow rays for that, at most: half a second of one core.
+constexpr std::size_t kMostSpreadLooks = 500'000;
 /// What a way in single precision is sent to is known to so much (unit box).
 constexpr double kNearEnd = 1e-5;
 
@@ -76,16 +79,27 @@ void PlaceLight::takeMirrors(const scene::PatchMaterials& materials) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       lamp_emission_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
   }
-  if (sources_.empty()) return;
-  // What rays do not find in mirrors leaves these as if it was diffuse (Solver::spreadByMirrors).
-  inTurns(sides_->size(), [&](std::size_t s) {
-    const auto& side = (*sides_)[s];
-    for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value) {
-      if (!mirrors_->has(value) || !(rays_->areaOf(value) > 0.0)) continue;
-      const auto draw = sobol4(0, mixKeys(kSpreadSeed, value));
-      const auto arrives = fromSources(spotOn(value, {draw.x, draw.y}), mixKeys(kSpreadSeed + 1, value));
-      emission_[value] += mirrors_->meanReflectance(value) * glm::vec3(arrives);
-    }
+  if (!sources_.empty()) spreadSources();
+}
+
+/// What rays do not find in mirrors leaves these as if it was diffuse (Solver::spreadByMirrors). A bounded number of
+/// leaves is asked; the others have what the one before them has.
+void PlaceLight::spreadSources() {
+  std::vector<std::uint32_t> spreading;
+  for (const auto& side : *sides_) {
+    for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value)
+      if (mirrors_->has(value) && !mirrors_->isGlass(value) && rays_->areaOf(value) > 0.0) spreading.push_back(value);
+  }
+  std::size_t looks = 0;
+  for (const auto& source : sources_) looks += source.kind == PunctualLights::Source::Kind::kLamp ? kLampLooks : 1;
+  const std::size_t step = 1 + spreading.size() * looks / kMostSpreadLooks;
+  inTurns((spreading.size() + step - 1) / step, [&](std::size_t block) {
+    interruptionPoint();
+    const auto value = spreading[block * step];
+    const auto draw = sobol4(0, mixKeys(kSpreadSeed, value));
+    const auto arrives = glm::vec3(fromSources(spotOn(value, {draw.x, draw.y}), mixKeys(kSpreadSeed + 1, value)));
+    for (auto i = block * step; i < std::min(spreading.size(), (block + 1) * step); ++i)
+      emission_[spreading[i]] += mirrors_->meanReflectance(spreading[i]) * arrives;
   });
 }
 
@@ -197,7 +211,8 @@ glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, 
                                std::size_t steps) const {
   if (LeafRays::isSky(value)) return sky_->at(value - LeafRays::kSky);
   if (value == LeafRays::kNothing) return glm::dvec3(0.0);
-  if (steps == 0 || value != end.value || !rays_->isCut(value)) return glm::dvec3(radiosity_[value]);
+  const bool is_mirror = mirrors_ && mirrors_->has(value);
+  if (steps == 0 || value != end.value || !rays_->isCut(value) || is_mirror) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
   const auto arrives = direct(there, mixKeys(key, 3), Looks::kFewer) + reflectedBy(there, mixKeys(key, 4), steps - 1);
   return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;

@@ -95,6 +95,7 @@ class PlaceLight {
   };
   [[nodiscard]] glm::dvec3 alongMirrors(const Met& met) const;
   void takeMirrors(const scene::PatchMaterials& materials);
+  void spreadSources();
   [[nodiscard]] glm::dvec3 fromSources(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,

@@ -43,14 +43,35 @@ TEST(SceneChange, whatAMaterialReflectsChangesItsMaterialAlone) {
     EXPECT_TRUE(onlyNodesMoved(before, after));
   };
   expectMaterial([](scene::Material& m) { m.metallic = 0.5F; });
-  expectMaterial([](scene::Material& m) { m.roughness = 0.5F; });
-  expectMaterial([](scene::Material& m) { m.ior = 1.3F; });
   expectMaterial([](scene::Material& m) { m.specular = {0.5F, 0, 0}; });
   expectMaterial([](scene::Material& m) { m.metallic_texture.texture = 0; });
   expectMaterial([](scene::Material& m) { m.specular_texture.texture = 1; });
   expectMaterial([](scene::Material& m) { m.metallic_texture.nearest = true; });
   expectMaterial([](scene::Material& m) { m.base_color_texture.nearest = true; });
   expectMaterial([](scene::Material& m) { m.emissive_texture.nearest = true; });
+}
+
+TEST(SceneChange, howRoughAMaterialIsMattersWhereItReflectsAsAMirror) {
+  for (const bool is_metal : {false, true}) {
+    Scene before = textured();
+    before.materials[0].metallic = is_metal ? 1.0F : 0.0F;
+    Scene after = before;
+    after.materials[0].roughness = 0.5F;
+    const auto change = changeBetween(before, after);
+    EXPECT_FALSE(change.geometry);
+    EXPECT_EQ(change.nothing(), !is_metal);
+  }
+}
+
+TEST(SceneChange, glassThatReflectsOtherwiseIsAnotherShapeThoughAsMuchPasses) {
+  Scene before = textured();
+  before.materials[0].transmission = 1.0F;
+  before.materials[0].base_color = glm::vec3(0.0F);  // nothing passes
+  Scene after = before;
+  after.materials[0].ior = 2.5F;
+  EXPECT_TRUE(changeBetween(before, after).geometry);
+  before.materials[0].transmission = 0.0F;
+  EXPECT_TRUE(changeBetween(before, after).geometry);
 }
 
 TEST(SceneChange, aFilterOfACutOutMovesItsEdgeAndSoChangesTheShape) {
