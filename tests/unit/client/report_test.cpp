@@ -17,7 +17,7 @@ protocol::StatusReply someStatus() {
   status.progress.shots = 1000;
   status.progress.seconds = 1.5;
   status.progress.error = {0.018, 0.0175, 0.001, 0.017, 0.003, 0.002};
-  status.progress.energy = {100.0, 90.0, 5.0, 4.0, 1.5, -0.5};
+  status.progress.energy = {100.0, 88.0, 2.0, 5.0, 4.0, 1.5, -0.5};
   status.progress.patches = 14'000;
   status.warnings = {"3 triangles dropped", "bad \xFF byte"};
   status.warning_count = 2;
@@ -35,6 +35,7 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
   for (const auto* name : {"emitted", "absorbed", "specular", "escaped", "backface", "unshot", "imbalance"})
     EXPECT_TRUE(report.at("energy").at(name).is_number()) << name;
   EXPECT_EQ(report["error"]["total"], 0.018);
+  EXPECT_EQ(report["energy"]["specular"], 2.0);
   EXPECT_EQ(report["energy"]["imbalance"], -0.5);
   EXPECT_EQ(report["gl_renderer"], "llvmpipe");
   EXPECT_EQ(report["warnings"].size(), 2U);

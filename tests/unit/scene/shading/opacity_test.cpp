@@ -79,12 +79,25 @@ TEST(Opacity, BlendedAreaIsAlphaTimesTheWhole) {
   EXPECT_NEAR(leafArea(patches), 0.2, 1e-3);
 }
 
-TEST(Opacity, TransmissionLetsItsFactorThroughWhateverTheMode) {
+// A leaf's area is that of light from all around, of which an interface reflects 0.04 + 0.96 / 21.
+TEST(Opacity, TransmissionLetsItsFactorOfWhatIsNotReflectedThrough) {
   Scene scene;
   Material glass;
   glass.transmission = 0.75F;
   place(scene, floorQuad(1.0), glm::dmat4(1.0), glass);
-  EXPECT_NEAR(leafArea(build(scene)), 0.25, 2e-3);  // opacity is kept in steps of 1/255
+  EXPECT_NEAR(leafArea(build(scene)), 1.0 - 0.75 * (1.0 - 0.04 - 0.96 / 21.0), 2e-3);  // kept in steps of 1/255
+}
+
+TEST(Opacity, WithoutAnInterfaceTransmissionLetsItsFactorThroughWhateverTheMode) {
+  for (const auto mode : {AlphaMode::kOpaque, AlphaMode::kBlend}) {
+    Scene scene;
+    Material clear;
+    clear.transmission = 0.75F;
+    clear.ior = 1.0F;
+    clear.alpha_mode = mode;
+    place(scene, floorQuad(1.0), glm::dmat4(1.0), clear);
+    EXPECT_NEAR(leafArea(build(scene)), 0.25, 2e-3);
+  }
 }
 
 TEST(Opacity, AFineTextureGetsAFineGrid) {
