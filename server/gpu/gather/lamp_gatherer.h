@@ -10,6 +10,7 @@
 #include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/light_delivery.h"
 #include "server/gpu/gather/receivers.h"
+#include "server/solver/transport/lamp_rays.h"
 
 namespace radiosity::gpu {
 

@@ -224,7 +224,8 @@ class LightPlacer {
     if (!(made.web->lumens > 0.0)) made.warnings.emplace_back("its web is dark in all directions");
     const double whole = 4.0 * std::numbers::pi * static_cast<double>(std::ranges::max(made.web->candela()));
     if (made.web->lumens > 0.0 && made.web->lumens < kNarrowBeam * whole)
-      made.warnings.emplace_back("its web is so narrow a beam that what it lights may be missed where the beam is narrower than a texel");
+      made.warnings.emplace_back(
+          "its web is so narrow a beam that what it lights may be missed where the beam is narrower than a texel");
     auto shared = std::make_shared<const ReadWeb>(std::move(made));
     if (key.buffer) webs.emplace(key, shared);
     return tell(std::move(shared), pointer);

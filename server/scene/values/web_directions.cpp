@@ -73,8 +73,8 @@ std::vector<WebDirections::RingPart> WebDirections::ringParts(std::span<const fl
     const double low = kDegree * static_cast<double>(polar_deg[row]);
     const double high = kDegree * static_cast<double>(polar_deg[row + 1]);
     const double width = high - low;
-    parts.push_back({std::cos(low) - std::cos(high),
-                     (std::sin(high) - std::sin(low) - width * std::cos(high)) / width});
+    parts.push_back(
+        {std::cos(low) - std::cos(high), (std::sin(high) - std::sin(low) - width * std::cos(high)) / width});
   }
   return parts;
 }

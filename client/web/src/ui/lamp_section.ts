@@ -50,6 +50,10 @@ export function shownValue({ value }: LightField): string {
   return String(Number(value.toPrecision(SHOWN)));
 }
 
+function rangeOf({ least = 0, most }: LightField): string {
+  return most === undefined ? `a number, ${least} or more` : `a number from ${least} to ${most}`;
+}
+
 /** `colour`: the control of the light's colour; `refuse`: tells what is wanted, and restores the field. */
 export function lightEditor(
   light: NodeLight,
@@ -66,7 +70,7 @@ export function lightEditor(
       onchange: () => {
         const wanted = storedValue(of, input.value);
         if (wanted !== undefined) actions.setLight(of.path, of.written?.(wanted) ?? wanted);
-        else refuse(input, of.most === undefined ? 'a number, 0 or more' : `a number from ${of.least ?? 0} to ${of.most}`);
+        else refuse(input, rangeOf(of));
       },
     });
     return field(of.label, input);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <sstream>
 
-#include "server/scene/import/import_scene.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
