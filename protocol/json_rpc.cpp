@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <array>
+#include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -136,6 +138,12 @@ Result<json> parseChecked(std::string_view text) {
 }  // namespace
 
 std::string dumpJson(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+double sixDigits(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return std::strtod(text.data(), nullptr);
+}
 
 bool isDeeperThan(std::string_view text, std::size_t limit) {
   std::size_t depth = 0;

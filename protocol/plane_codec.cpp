@@ -1,8 +1,6 @@
 // Measuring planes to JSON and back.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <utility>
 
 #include "protocol/http_bodies.h"
@@ -18,30 +16,23 @@ using nlohmann::json;
 constexpr double kMost = std::numeric_limits<double>::max();
 constexpr const char* kVerdicts = "passes, fails, undecided";
 
-/// Six digits are more than anything is known to, and a grid is a third as long with them.
-double rounded(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value);
-  return std::strtod(text.data(), nullptr);
-}
-
 json listOf(const std::vector<double>& values) {
   json list = json::array();
-  for (const double value : values) list.push_back(rounded(value));
+  for (const double value : values) list.push_back(sixDigits(value));
   return list;
 }
 
 void addFigures(json& to, const PlaneFigures& f, const char* light) {
-  to["mean"] = rounded(f.mean);
-  to["meanError"] = rounded(f.mean_error);
-  to["minimum"] = rounded(f.minimum);
-  to["minimumError"] = rounded(f.minimum_error);
-  to["maximum"] = rounded(f.maximum);
-  to["maximumError"] = rounded(f.maximum_error);
-  to["median"] = rounded(f.median);
-  to["uniformity"] = rounded(f.uniformity);
-  to["uniformityError"] = rounded(f.uniformity_error);
-  to["solveError"] = rounded(f.solve_error);
+  to["mean"] = sixDigits(f.mean);
+  to["meanError"] = sixDigits(f.mean_error);
+  to["minimum"] = sixDigits(f.minimum);
+  to["minimumError"] = sixDigits(f.minimum_error);
+  to["maximum"] = sixDigits(f.maximum);
+  to["maximumError"] = sixDigits(f.maximum_error);
+  to["median"] = sixDigits(f.median);
+  to["uniformity"] = sixDigits(f.uniformity);
+  to["uniformityError"] = sixDigits(f.uniformity_error);
+  to["solveError"] = sixDigits(f.solve_error);
   if (f.light.empty()) return;
   to[light] = listOf(f.light);
   to["standardError"] = listOf(f.error);
@@ -125,7 +116,7 @@ void read(Reader& r, Plane& plane) {
 }  // namespace
 
 json toJson(const Planes& planes) {
-  json out = {{"revision", planes.revision}, {"state", planes.state}, {"error", rounded(planes.error)}};
+  json out = {{"revision", planes.revision}, {"state", planes.state}, {"error", sixDigits(planes.error)}};
   out["planes"] = json::array();
   for (const auto& plane : planes.planes) out["planes"].push_back(toJson(plane));
   return out;

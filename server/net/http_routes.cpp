@@ -159,10 +159,14 @@ void getWeb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond
   if (error != std::errc() || std::string_view(end, text.data() + text.size()) != ".json")
     return done(errorResponse(
         {ErrorCode::kNotFound, "webs are /webs/<index in EXT_lights_ies>.json, counted from 0", request.path}));
+  const auto encode = [](const Result<engine::ShownWeb>& web) -> Result<std::string> {
+    if (!web) return tl::unexpected(web.error());
+    return protocol::encodeHttpWeb(toWeb(*web));
+  };
   hub->engine().lightWeb(light, clientOf(request),
-                         hub->fromEngine<engine::ShownWeb>([done](const Result<engine::ShownWeb>& web) {
-                           if (!web) return done(errorResponse(web.error()));
-                           auto response = plain(200, protocol::encodeHttpWeb(toWeb(*web)));
+                         hub->fromEngineMade<engine::ShownWeb>(encode, [done](Result<std::string> body) {
+                           if (!body) return done(errorResponse(body.error()));
+                           auto response = plain(200, std::move(*body));
                            response.content_type = "application/json";
                            done(std::move(response));
                          }));

@@ -272,7 +272,7 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
   const double lost = std::max(0.0, channelSum(energy.escaped)) + std::max(0.0, on_backs);
   if (!(lost > kNothing * emitted)) return;
   std::optional<solver::LostLight> rays;  // made where something is to be asked
-  const auto ask = [&]() -> const solver::LostLight& {
+  const auto ask = [&]() -> solver::LostLight& {
     if (!rays) rays.emplace(parts.patches, parts.materials, solver.rays());
     return *rays;
   };
@@ -284,6 +284,7 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
   const Lamps lamps(parts);
   for (std::uint32_t i = 0; i < parts.scene.instances.size(); ++i) {
     if (!mayBeLost(lamps.of(i).power)) continue;
+    interruptionPoint();
     const auto fate = ask().ofInstance(i);
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("lamp {} lights nothing: {}", nameOf(parts, i), endOf(parts, fate, false)); });
@@ -291,6 +292,7 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
   const auto powers = solver::fluxes(parts.patches, parts.sources);
   for (std::size_t i = 0; i < parts.sources.lights.size(); ++i) {
     if (!mayBeLost(powers[i])) continue;
+    interruptionPoint();
     const auto fate = ask().ofLight(parts.sources.lights[i]);
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("{} lights nothing: {}", lightName(parts, i), endOf(parts, fate, true)); });

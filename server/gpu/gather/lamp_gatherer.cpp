@@ -151,13 +151,13 @@ LostShare LampGatherer::loseFromFar(const solver::LampShot& shot, const solver::
   return lost;
 }
 
-LostShare LampGatherer::loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp) const {
+LostShare LampGatherer::loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp) {
   const auto key = solver::mixKeys(shot.key, Receivers::placeKey({shot.at[0], 1.0F}));
   if (lamp.shape.isFar()) return loseFromFar(shot, lamp, key);
   const solver::Sobol4 draws(key);
   const auto middle = 0.5F * (box_[0] + box_[1]);
   const float reach = glm::distance(lamp.shape.centre, middle) + glm::distance(box_[0], box_[1]) + lamp.shape.reach();
-  const solver::LampRays leaving(lamp);
+  const solver::LampRays leaving(lamp, webs_);
   const auto rayOf = [&](std::uint32_t index) -> LostRay {
     const auto draw = draws(index);
     const auto ray = leaving({draw.x, draw.y, draw.z, draw.w});

@@ -10,6 +10,7 @@
 #include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/light_delivery.h"
 #include "server/gpu/gather/receivers.h"
+#include "server/solver/transport/lamp_rays.h"
 
 namespace radiosity::gpu {
 
@@ -32,11 +33,12 @@ class LampGatherer {
   };
   class Ways;
   void lookFrom(const solver::LampShot& shot, const solver::Lamp& lamp, const Receivers::Group& group, Ways& ways);
-  [[nodiscard]] LostShare loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp) const;
+  [[nodiscard]] LostShare loseByRays(const solver::LampShot& shot, const solver::Lamp& lamp);
   [[nodiscard]] LostShare loseFromFar(const solver::LampShot& shot, const solver::Lamp& lamp, std::uint64_t key) const;
 
   std::shared_ptr<const Receivers> receivers_;
   std::array<glm::vec3, 2> box_{};
+  solver::KnownWebs webs_;
   std::vector<solver::LampLooks> looks_;  ///< by receiver
   std::vector<float> irradiance_;         ///< by receiver: for an intensity of 1
 };

@@ -269,7 +269,7 @@ class IesFile {
     auto columns = upTo(horizontal.size()), rows = upTo(vertical.size());
     tellOfSides(horizontal, vertical);
     if (!completeSides(horizontal, columns) || !completeSides(vertical, rows))
-      return numbers_.bad("angles of types A and B must go from -90 or 0 to 90");
+      return numbers_.bad("angles of types A and B must begin at 0 or below and end above 0");
     const bool is_b = photometry_.type == 2;
     file_.frame = is_b ? WebFrame::kB : WebFrame::kA;
     file_.web = turned(is_b, horizontal, vertical, [&](std::size_t h, std::size_t v) {

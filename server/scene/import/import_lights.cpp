@@ -23,7 +23,8 @@ constexpr double kMostSize = 1e6;
 constexpr double kWidestSun = 90.0;
 /// Times the candela of a web, or square metres, it is still a number in single precision.
 constexpr float kBrightest = 1e24F;
-/// Of all directions: a web that shines into less is found by few of the rays that look for its light.
+/// Of all directions, some two degrees across: a web that shines into less may pass between the places of the texels
+/// that look for its light.
 constexpr double kNarrowBeam = 1e-4;
 constexpr const char* kPunctual = "KHR_lights_punctual";
 constexpr const char* kArea = "EXT_lights_area";
@@ -223,7 +224,8 @@ class LightPlacer {
     if (!(made.web->lumens > 0.0)) made.warnings.emplace_back("its web is dark in all directions");
     const double whole = 4.0 * std::numbers::pi * static_cast<double>(std::ranges::max(made.web->candela()));
     if (made.web->lumens > 0.0 && made.web->lumens < kNarrowBeam * whole)
-      made.warnings.emplace_back("its web is so narrow a beam that what it lights may be missed");
+      made.warnings.emplace_back(
+          "its web is so narrow a beam that what it lights may be missed where the beam is narrower than a texel");
     auto shared = std::make_shared<const ReadWeb>(std::move(made));
     if (key.buffer) webs.emplace(key, shared);
     return tell(std::move(shared), pointer);

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "common/task.h"
 #include "server/scene/document/document_uri.h"
 #include "server/scene/import/photometric_file.h"
 
@@ -12,10 +13,11 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// The file's bytes; `decoded` holds those of a data URI.
+/// The file's bytes, from the buffer view where there is one, as the import takes them; `decoded` holds those of a data
+/// URI.
 Result<std::span<const std::uint8_t>> bytesOf(const Document& document, const Json& light, const std::string& where,
                                               Bytes& decoded) {
-  if (const auto uri = light.value("uri", std::string()); isDataUri(uri)) {
+  if (const auto uri = light.value("uri", std::string()); !light.contains("bufferView") && isDataUri(uri)) {
     auto data = decodeDataUri(uri, where);
     if (!data) return tl::unexpected(data.error());
     decoded = std::move(*data);
@@ -75,6 +77,7 @@ Result<ShownWeb> lightWebOf(const Document& document, std::size_t light) {
   Bytes decoded;
   const auto bytes = bytesOf(document, list[light], where, decoded);
   if (!bytes) return tl::unexpected(bytes.error());
+  interruptionPoint();
   const auto file = parsePhotometricFile(*bytes, where);
   if (!file) return tl::unexpected(file.error());
   return shown(file->web, webAxes(file->frame));

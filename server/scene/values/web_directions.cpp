@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <utility>
 
 namespace radiosity::scene {
 namespace {
@@ -36,27 +38,45 @@ WebDirections::WebDirections(std::span<const float> table) {
   candela_ = table.subspan(kHead + rows + azimuths);
   columns_ = std::max<std::size_t>(azimuths, 2) - 1;
   until_row_.reserve(columns_ * (rows - 1));
+  const auto parts = ringParts(polar_);
+  auto here = rings(0, parts);
   double lumens = 0.0;
   for (std::size_t column = 0; column < columns_; ++column) {
     const auto next = std::min(column + 1, azimuths - 1);
-    std::vector<double> sums;
-    double sum = 0.0;
-    for (std::size_t row = 0; row + 1 < rows; ++row) sums.push_back(sum += 0.5 * (ring(column, row) + ring(next, row)));
-    for (const double until : sums) until_row_.push_back(static_cast<float>(sum > 0.0 ? until / sum : 0.0));
+    auto there = rings(next, parts);
+    for (std::size_t row = 0; row + 1 < rows; ++row) here[row] = 0.5 * (here[row] + there[row]);
+    const double sum = std::accumulate(here.begin(), here.end(), 0.0);
+    double until = 0.0;
+    for (const double ring : here) until_row_.push_back(static_cast<float>(sum > 0.0 ? (until += ring) / sum : 0.0));
     const double turn =
         azimuths > 1 ? kDegree * static_cast<double>(azimuth_[next] - azimuth_[column]) : 2.0 * std::numbers::pi;
     until_column_.push_back(lumens += sum * turn);
+    here = std::move(there);
   }
 }
 
+std::vector<double> WebDirections::rings(std::size_t azimuth, std::span<const RingPart> parts) const {
+  const auto candela = candela_.subspan(azimuth * polar_.size(), polar_.size());
+  std::vector<double> flux;
+  flux.reserve(parts.size());
+  for (std::size_t row = 0; row < parts.size(); ++row) {
+    const auto first = static_cast<double>(candela[row]), second = static_cast<double>(candela[row + 1]);
+    flux.push_back(std::max(0.0, first * parts[row].whole + (second - first) * parts[row].rising));
+  }
+  return flux;
+}
+
 /// Candela are linear in the angle; the flux is that of LightWeb::lumens.
-double WebDirections::ring(std::size_t azimuth, std::size_t row) const {
-  const double low = kDegree * static_cast<double>(polar_[row]), high = kDegree * static_cast<double>(polar_[row + 1]);
-  const double width = high - low, whole = std::cos(low) - std::cos(high);
-  const double rising = (std::sin(high) - std::sin(low) - width * std::cos(high)) / width;
-  const auto first = static_cast<double>(candela_[azimuth * polar_.size() + row]);
-  const auto second = static_cast<double>(candela_[azimuth * polar_.size() + row + 1]);
-  return std::max(0.0, first * whole + (second - first) * rising);
+std::vector<WebDirections::RingPart> WebDirections::ringParts(std::span<const float> polar_deg) {
+  std::vector<RingPart> parts;
+  for (std::size_t row = 0; row + 1 < polar_deg.size(); ++row) {
+    const double low = kDegree * static_cast<double>(polar_deg[row]);
+    const double high = kDegree * static_cast<double>(polar_deg[row + 1]);
+    const double width = high - low;
+    parts.push_back(
+        {std::cos(low) - std::cos(high), (std::sin(high) - std::sin(low) - width * std::cos(high)) / width});
+  }
+  return parts;
 }
 
 /// Within a cell directions are uniform over the solid angle.

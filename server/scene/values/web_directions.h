@@ -23,8 +23,14 @@ class WebDirections {
   [[nodiscard]] Direction at(const glm::dvec2& at) const;
 
  private:
-  /// Flux between two neighbouring polar angles along one azimuth, per radian of azimuth.
-  [[nodiscard]] double ring(std::size_t azimuth, std::size_t row) const;
+  /// Flux between two neighbouring polar angles, per radian of azimuth: where the candela are 1, and where they rise
+  /// from 0 to 1.
+  struct RingPart {
+    double whole, rising;
+  };
+  [[nodiscard]] static std::vector<RingPart> ringParts(std::span<const float> polar_deg);
+  /// Likewise, by row, where the candela are those along one azimuth.
+  [[nodiscard]] std::vector<double> rings(std::size_t azimuth, std::span<const RingPart> parts) const;
 
   std::span<const float> polar_, azimuth_, candela_;  ///< of the table
   std::size_t columns_ = 1;                           ///< of cells

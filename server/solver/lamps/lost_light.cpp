@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "common/task.h"
 #include "server/solver/lamps/lamp_of_light.h"
 #include "server/solver/math/sampling.h"
 
@@ -116,11 +117,11 @@ LostLight::Ray LostLight::fromFar(const glm::dvec3& towards, double u, double v)
   return {from, -towards};
 }
 
-std::optional<LampRays> LostLight::leaving(const scene::PunctualLight& light) const {
+std::optional<LampRays> LostLight::leaving(const scene::PunctualLight& light) {
   if (light.kind == scene::LightKind::kDirectional || !hasSizeOrWeb(light)) return std::nullopt;
   // The cone only weighs rays within the angle that is asked for below, too.
   const auto web = light.web ? std::span<const float>(light.web->table) : std::span<const float>();
-  return LampRays({lampShape(patches_, light, {}), web});
+  return LampRays({lampShape(patches_, light, {}), web}, webs_);
 }
 
 LostLight::Ray LostLight::ofLamp(const scene::PunctualLight& light, const LampRays* leaving, std::uint32_t index,
@@ -175,7 +176,7 @@ LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
   return fate;
 }
 
-LostLight::Fate LostLight::ofLight(const scene::PunctualLight& light) const {
+LostLight::Fate LostLight::ofLight(const scene::PunctualLight& light) {
   Fate fate;
   bool sends = false;
   const auto rays = leaving(light);
@@ -189,8 +190,7 @@ LostLight::Fate LostLight::ofLight(const scene::PunctualLight& light) const {
   return fate;
 }
 
-std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradiance,
-                                               const LightSources& sources) const {
+std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradiance, const LightSources& sources) {
   Senders senders;
   std::uint32_t number = 0;  // leaf values come first
   for (const auto& side : sides_) {
@@ -216,7 +216,10 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
   for (std::uint32_t i = 0; i < kBackRays && !senders.empty(); ++i) {
     const auto sender = senders.at((i + 0.5) / kBackRays);  // all draws of one sender follow each other
     const bool is_light = sender >= first_light && sender < first_sky;
-    if (is_light && sender != std::exchange(last, sender)) rays = leaving(sources.lights[sender - first_light]);
+    if (sender != std::exchange(last, sender)) {
+      interruptionPoint();
+      if (is_light) rays = leaving(sources.lights[sender - first_light]);
+    }
     const auto at = sobol4(i, kKey);
     const auto up = glm::dvec3(0.0, sender == first_sky ? 1.0 : -1.0, 0.0);
     const auto ray = sender < first_light ? ofLeaf(sender, i, kKey)

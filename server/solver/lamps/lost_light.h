@@ -40,7 +40,7 @@ class LostLight {
   /// Of all emission of one instance. Cost: up to kRays rays, and a pass over its leaves.
   [[nodiscard]] Fate ofInstance(std::uint32_t instance) const;
   /// Of a light without extent.
-  [[nodiscard]] Fate ofLight(const scene::PunctualLight& light) const;
+  [[nodiscard]] Fate ofLight(const scene::PunctualLight& light);
 
   /// By instance: the part of the light that ends on backs which ends on those of the instance; largest first, none of
   /// 0. `irradiance`: lux, by node of level 0. Cost: some thousand rays, a pass over all leaves.
@@ -48,7 +48,7 @@ class LostLight {
     std::uint32_t instance;
     double part;
   };
-  [[nodiscard]] std::vector<Share> backs(std::span<const glm::vec3> irradiance, const LightSources& sources) const;
+  [[nodiscard]] std::vector<Share> backs(std::span<const glm::vec3> irradiance, const LightSources& sources);
 
  private:
   struct Ray {
@@ -63,7 +63,7 @@ class LostLight {
   [[nodiscard]] Ray ofLamp(const scene::PunctualLight& light, const LampRays* leaving, std::uint32_t index,
                            std::uint64_t key) const;
   /// Of a light with a size or a web; none of others.
-  [[nodiscard]] std::optional<LampRays> leaving(const scene::PunctualLight& light) const;
+  [[nodiscard]] std::optional<LampRays> leaving(const scene::PunctualLight& light);
   /// From outside of the scene, against `towards`.
   [[nodiscard]] Ray fromFar(const glm::dvec3& towards, double u, double v) const;
   /// True: it arrives.
@@ -74,6 +74,7 @@ class LostLight {
   std::vector<Side> sides_;
   std::vector<std::vector<std::uint32_t>> sides_of_;  ///< by instance: into sides_
   std::shared_ptr<const LeafRays> rays_;
+  KnownWebs webs_;
   glm::dvec3 middle_{0.0};
   double radius_ = 0.0;
 };

@@ -1,12 +1,22 @@
 #include "server/solver/transport/lamp_rays.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
 namespace radiosity::solver {
 
-LampRays::LampRays(const Lamp& lamp) : lamp_(lamp) {
-  if (lamp.shape.kind == LampShape::Kind::kWeb) web_.emplace(lamp.web);
+std::shared_ptr<const scene::WebDirections> KnownWebs::of(std::span<const float> table) {
+  auto found = std::ranges::find_if(known_, [&](const auto& known) { return std::ranges::equal(known->table, table); });
+  if (found == known_.end()) {
+    if (known_.size() == kMost) known_.pop_front();
+    found = known_.insert(known_.end(), std::make_shared<const Known>(table));
+  }
+  return {*found, &(*found)->directions};
+}
+
+LampRays::LampRays(const Lamp& lamp, KnownWebs& webs) : lamp_(lamp) {
+  if (lamp.shape.kind == LampShape::Kind::kWeb) web_ = webs.of(lamp.web);
 }
 
 LampRay LampRays::operator()(const std::array<double, 4>& at) const {

@@ -227,6 +227,15 @@ describe('connection', () => {
 });
 
 describe('rpc', () => {
+  it('lets no call wait for a server that could not read one of them', async () => {
+    const rpc = new Rpc({ readyState: 1, send: () => undefined }, () => undefined);
+    const calls = [rpc.call('a'), rpc.call('b')];
+    const refusals = calls.map((call) => expect(call).rejects.toMatchObject({ code: -32700, message: 'not JSON' }));
+    rpc.receive(JSON.stringify({ jsonrpc: '2.0', id: null, error: { code: -32700, message: 'not JSON' } }));
+    await Promise.all(refusals);
+    rpc.receive(JSON.stringify({ jsonrpc: '2.0', id: 1, result: 1 })); // comes late
+  });
+
   it('matches answers by id, not by order, also in batches', async () => {
     const sent: { id: number }[] = [];
     const notes: string[] = [];

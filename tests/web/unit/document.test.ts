@@ -225,6 +225,10 @@ describe('scenes', () => {
     expect(isSameScene(named(undefined), named(undefined, 'lamp', 'lamp 2'))).toBe(false);
     expect(isSameScene(named('floor', 'wall'), named('far away'))).toBe(false);
     expect(isSameScene(named('a'), named('x', 'y', 'a'))).toBe(false);
+    const solid = (...names: string[]): Gltf => ({ ...named(), nodes: names.map((name) => ({ name, mesh: 0 })) });
+    const cubes = solid('Cube', 'Cube.001', 'Cube.002');
+    expect(isSameScene(solid('Cube'), cubes), 'programs number their objects').toBe(false);
+    expect(isSameScene(cubes, solid('Cube'))).toBe(false);
   });
 });
 

@@ -1,14 +1,17 @@
 // Lamps that the viewer adds, what it shows of them in other units, and how it draws them.
 
+import { Object3D, Vector3 } from 'three';
 import { applyPatch } from '../../../client/web/src/document/json_patch';
 import { undoOnServer, redoOnServer } from '../../../client/web/src/document/edits';
 import { largestScale, type Gltf } from '../../../client/web/src/document/gltf';
 import { lightOf, webOf, type LampWeb, type LightField } from '../../../client/web/src/document/lights';
-import { addLamp, profileType, type NewLamp } from '../../../client/web/src/document/new_lamps';
+import { addLamp, profileName, profileType, type NewLamp } from '../../../client/web/src/document/new_lamps';
 import { lampLike } from '../../../client/web/src/editing/placement';
 import type { Json } from '../../../client/web/src/protocol/messages';
 import { WebFetch } from '../../../client/web/src/scenes/web_fetch';
 import { shownValue, storedValue } from '../../../client/web/src/ui/lamp_section';
+import { LampMarker } from '../../../client/web/src/view/scene/lamp_marker';
+import { LampMarkers } from '../../../client/web/src/view/scene/lamp_markers';
 import { outlineOf, webLines, type Lines } from '../../../client/web/src/view/scene/lamp_outline';
 
 const json = (gltf: Gltf) => gltf as unknown as Json;
@@ -58,6 +61,12 @@ describe('new lamps', () => {
     expect(webOf(gltf, second)).toBe(1);
   });
 
+  it('have names that JSON can carry', () => {
+    expect(profileName('Flood 40.ies')).toBe('Flood 40');
+    expect(profileName(`${'a'.repeat(59)}\u{1f4a1}\u{1f4a1}.ldt`)).toBe(`${'a'.repeat(59)}\u{1f4a1}`);
+    expect(profileName('half \ud83d letter.ies')).toBe('half \ufffd letter');
+  });
+
   it('light a wall alike, whatever their kind', () => {
     const onAxis = (lamp: NewLamp) =>
       'nits' in lamp ? lamp.nits * lamp.size ** 2 * (lamp.type === 'disk' ? Math.PI / 4 : 1) : 0;
@@ -95,6 +104,20 @@ describe('the flux of a lamp', () => {
     expect(largestScale(gltf, gltf.nodes!.length - 1)).toBe(2);
   });
 
+  it('is found for a hundred panels without a pass over all nodes for each', () => {
+    const { gltf } = withLamp({ type: 'rect', nits: 10, size: 1 });
+    let reads = 0;
+    const panel = { extensions: { EXT_lights_area: { light: 0 } } };
+    const counted = Object.defineProperty({ ...panel }, 'children', { get: () => void ++reads });
+    gltf.nodes = Array.from({ length: 100 }, () => counted);
+    gltf.scenes = [{ nodes: gltf.nodes.map((_, i) => i) }];
+    const markers = new LampMarkers();
+    markers.place(gltf, new Map(), new Object3D(), 10);
+    expect([...markers.values()]).toHaveLength(100);
+    expect(reads).toBeLessThan(500);
+    markers.dispose();
+  });
+
   it('sets the intensity, and is refused where it is no number that the lamp can have', () => {
     const { gltf, node } = withLamp({ type: 'point', candela: 10 });
     const field = flux(gltf, node);
@@ -115,6 +138,9 @@ describe('the flux of a lamp', () => {
       'Flux, lm: 12',
       'Peak, cd: 500',
     ]);
+    gltf.nodes![node]!.extensions!.EXT_lights_ies!.color = [0, 1, 0];
+    const [, , peak] = lightOf(gltf, node, new Map([[0, beam()]]))!.fields;
+    expect(peak!.value, 'of its colour, as the flux is').toBeCloseTo(0.7152 * 500, 9);
   });
 });
 
@@ -172,7 +198,23 @@ describe('outlines', () => {
 });
 
 describe('webs', () => {
-  it('are fetched once for each file, again after a failure, and forgotten with the document', async () => {
+  it('lie in a mirrored node as the light does, which has no mirrored axes', () => {
+    const node = new Object3D();
+    node.scale.set(-2, 1, 1);
+    const marker = new LampMarker(0);
+    node.add(marker);
+    const light = { type: 'ies' } as const;
+    marker.display({ light, outline: [], web: [0, 0, 0, 1, 2, 3], selected: true }, 0.1);
+    const web = marker.children.at(-1)!;
+    // The server takes X, here towards -X, and Z as they are, and Z x X as the third: -Y.
+    expect(web.localToWorld(new Vector3(1, 2, 3)).toArray()).toEqual([-1, -2, 3].map((v) => expect.closeTo(v, 9)));
+    node.scale.set(-2, -1, 1);
+    node.updateMatrixWorld(true);
+    marker.display({ light, outline: [], web: [0, 0, 0, 1, 2, 3], selected: true }, 0.1);
+    expect(web.localToWorld(new Vector3(1, 2, 3)).toArray()).toEqual([-1, -2, 3].map((v) => expect.closeTo(v, 9)));
+  });
+
+  it('are fetched once for each file, again a while after a failure, and forgotten with the document', async () => {
     const { gltf } = withLamp({ type: 'ies', name: 'beam', file: FILE });
     const asked: string[] = [];
     let broken = true;
@@ -185,10 +227,15 @@ describe('webs', () => {
     await webs.want(gltf, undefined);
     await webs.want(gltf, 7);
     expect(asked).toEqual([]);
+    vi.useFakeTimers({ toFake: ['Date'] });
     await webs.want(gltf, 0);
     broken = false;
     await webs.want(gltf, 0);
+    expect(asked, 'not at each step of a drag').toEqual(['/webs/0.json']);
+    vi.setSystemTime(Date.now() + 6000);
     await webs.want(gltf, 0);
+    await webs.want(gltf, 0);
+    vi.useRealTimers();
     expect(asked).toEqual(['/webs/0.json', '/webs/0.json']);
     expect(webs.webs.get(0)?.lumens).toBe(12);
     gltf.extensions!.EXT_lights_ies!.lights[0]!.bufferView = 1;

@@ -3,8 +3,9 @@
 import * as edits from '../../../client/web/src/document/edits';
 import type { Gltf, GltfLight } from '../../../client/web/src/document/gltf';
 import { applyPatch } from '../../../client/web/src/document/json_patch';
-import { handlesOf, lightOf } from '../../../client/web/src/document/lights';
+import { handlesOf, lightOf, lookOf } from '../../../client/web/src/document/lights';
 import type { Json } from '../../../client/web/src/protocol/messages';
+import { storedValue } from '../../../client/web/src/ui/lamp_section';
 
 const json = (gltf: Gltf) => gltf as unknown as Json;
 
@@ -52,6 +53,14 @@ describe('lights', () => {
     expect(edits.describePatch(gltf, edits.setLight(gltf, radius!.path, 0.2))).toContain('light: radius');
   });
 
+  it('look as they are whether their fields are asked for or not', () => {
+    for (const node of [0, 1, 2]) {
+      const { type, color } = lightOf(lamps(), node)!;
+      expect(lookOf(lamps(), node)).toEqual({ type, color });
+    }
+    expect(lookOf(lamps(), 3)).toBeUndefined();
+  });
+
   it('have handles for what changes something', () => {
     expect(handlesOf(lamps(), 0)).toEqual(['translate', 'rotate', 'scale']);
     expect(handlesOf(lamps(), 1)).toEqual(['translate', 'rotate']);
@@ -78,5 +87,46 @@ describe('handles', () => {
   it('are all offered of a lamp with something else to it', () => {
     expect(handlesOf(lamp('point', { mesh: 0 }), 0)).toEqual(all);
     expect(handlesOf(lamp('point', { children: [1] }), 0)).toEqual(all);
+  });
+});
+
+describe('the cones of a spot', () => {
+  const DEGREE = Math.PI / 180;
+  const spot = (inner: number, outer: number): Gltf => ({
+    asset: { version: '2.0' },
+    nodes: [{ extensions: { KHR_lights_punctual: { light: 0 } } }],
+    extensions: {
+      KHR_lights_punctual: {
+        lights: [{ type: 'spot', spot: { innerConeAngle: inner * DEGREE, outerConeAngle: outer * DEGREE } }],
+      },
+    },
+  });
+  /** The spot in degrees after a number was written into the field; undefined: the field refused it. */
+  const after = (gltf: Gltf, label: string, text: string) => {
+    const field = lightOf(gltf, 0)!.fields.find((one) => one.label === label)!;
+    const stored = storedValue(field, text);
+    if (stored === undefined) return undefined;
+    const patch = edits.setLight(gltf, field.path, field.written!(stored));
+    expect(patch).toHaveLength(1);
+    applyPatch(json(gltf), patch);
+    const { innerConeAngle, outerConeAngle } = gltf.extensions!.KHR_lights_punctual!.lights[0]!.spot!;
+    expect(innerConeAngle!).toBeLessThan(outerConeAngle!);
+    expect(outerConeAngle!).toBeLessThanOrEqual(Math.PI / 2);
+    return [innerConeAngle!, outerConeAngle!].map((angle) => Number((angle / DEGREE).toFixed(3)));
+  };
+
+  it('stay apart, whichever of them is written', () => {
+    expect(after(spot(10, 40), 'Edge at, °', '60')).toEqual([10, 60]);
+    expect(after(spot(10, 40), 'Full to, °', '20')).toEqual([20, 40]);
+    expect(after(spot(30, 40), 'Edge at, °', '20')).toEqual([19.9, 20]);
+    expect(after(spot(10, 40), 'Full to, °', '50')).toEqual([50, 50.1]);
+    expect(after(spot(10, 40), 'Full to, °', '89.9')).toEqual([89.9, 90]);
+    expect(after(spot(10, 40), 'Edge at, °', '0.1')).toEqual([0, 0.1]);
+  });
+
+  it('are no wider than a half space, and never shut', () => {
+    expect(after(spot(10, 40), 'Edge at, °', '0')).toBeUndefined();
+    expect(after(spot(10, 40), 'Edge at, °', '91')).toBeUndefined();
+    expect(after(spot(10, 40), 'Full to, °', '90')).toBeUndefined();
   });
 });

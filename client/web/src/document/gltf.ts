@@ -91,12 +91,19 @@ export interface Gltf {
   extras?: Json;
 }
 
+/** By node: the one above. */
+export type Parents = ReadonlyMap<number, number>;
+
+/** Of the document as it is now: patches change it in place. A pass over all nodes. */
+export function parentsOf(gltf: Gltf): Parents {
+  return new Map((gltf.nodes ?? []).flatMap(({ children }, i) => (children ?? []).map((child) => [child, i])));
+}
+
 /**
  * The largest scale of a node in the scene, in any direction along its axes, by which area lights grow. Copes with
- * cycles.
+ * cycles. Who asks for many nodes hands `parents` in: else each call is a pass over all nodes.
  */
-export function largestScale(gltf: Gltf, node: number): number {
-  const parents = new Map((gltf.nodes ?? []).flatMap(({ children }, i) => (children ?? []).map((child) => [child, i])));
+export function largestScale(gltf: Gltf, node: number, parents = parentsOf(gltf)): number {
   let axes: Vec3[] = [
     [1, 0, 0],
     [0, 1, 0],
@@ -129,14 +136,15 @@ function placed({ matrix, rotation = [0, 0, 0, 1], scale = [1, 1, 1] }: GltfNode
 
 /**
  * Whether two documents are of one scene, so that a node's number means the same object in both. At least half of the
- * nodes then have the same names, whatever was edited in between, or one of them begins with all that the other has, as
- * lists grow at their ends; in two scenes that would be chance.
+ * nodes then have the same names, whatever was edited in between, or one of them begins with all that the other has and
+ * goes on with what the viewer adds, which has no mesh. Other scenes may begin alike, as programs number their objects.
  */
 export function isSameScene(a: Gltf, b: Gltf): boolean {
   const [left, right] = [a.nodes ?? [], b.nodes ?? []];
   const alike = left.filter(({ name }, i) => i < right.length && (name ?? '') === (right[i]!.name ?? '')).length;
-  const fewer = left.length < right.length ? left : right;
-  const hasGrown = alike === fewer.length && fewer.some(({ name }) => name);
+  const [fewer, more] = left.length < right.length ? [left, right] : [right, left];
+  const isAdded = more.slice(fewer.length).every(({ mesh }) => mesh === undefined);
+  const hasGrown = isAdded && alike === fewer.length && fewer.some(({ name }) => name);
   return hasGrown || 2 * alike >= Math.max(left.length, right.length);
 }
 

@@ -1,25 +1,33 @@
 // The lights of nodes that are no surfaces: point, spot and directional ones, area lights, and lamps with a photometric
 // web (IES). What the viewer shows of them, and where in the document it lies.
 
+import type { Json } from '../protocol/messages';
 import { type Gltf, type GltfAreaLight, type GltfLight, largestScale, type Vec3 } from './gltf';
 
 export type LightType = GltfLight['type'] | GltfAreaLight['type'] | 'ies';
 
 /**
  * A number that people may change. `path`: its JSON pointer. `per`: the document's number is `value` / `per`, as for a
- * flux in lumens beside an intensity in candela, or degrees beside radians. `most`: the largest that is accepted.
+ * flux in lumens beside an intensity in candela, or degrees beside radians. `least` (0 without) and `most` are accepted.
+ * `written`: what the document gets at `path` for its number, where others change with that.
  */
 export interface LightField {
   label: string;
   path: string;
   value: number;
   per?: number;
+  least?: number;
   most?: number;
+  written?: (stored: number) => Json;
 }
 
-export interface NodeLight {
+/** What a light is, without what may be changed about it. */
+export interface LightLook {
   type: LightType;
   color: Vec3;
+}
+
+export interface NodeLight extends LightLook {
   colorPath: string;
   /** The first is its strength. */
   fields: LightField[];
@@ -45,8 +53,23 @@ const NO_WEBS: LampWebs = new Map();
 const DEGREE = Math.PI / 180;
 /** glTF's own: half of the angle of a cone. */
 const OUTER_CONE = Math.PI / 4;
+/** Degrees between the cones of a spot, which KHR_lights_punctual wants apart. */
+const CONE_GAP = 0.1;
 
-/** The light of a node, if it has one. */
+/** What the light of a node is, if it has one. O(1). */
+export function lookOf(gltf: Gltf, node: number): LightLook | undefined {
+  const {
+    KHR_lights_punctual: punctual,
+    EXT_lights_area: area,
+    EXT_lights_ies: ies,
+  } = gltf.nodes?.[node]?.extensions ?? {};
+  const { KHR_lights_punctual: lights, EXT_lights_area: areas } = gltf.extensions ?? {};
+  const light = (punctual && lights?.lights[punctual.light]) ?? (area && areas?.lights[area.light]);
+  if (light) return { type: light.type, color: light.color ?? WHITE };
+  return ies && { type: 'ies', color: ies.color ?? WHITE };
+}
+
+/** The light of a node, if it has one. A pass over all nodes where the light has an area: of many, ask lookOf(). */
 export function lightOf(gltf: Gltf, node: number, webs = NO_WEBS): NodeLight | undefined {
   const {
     KHR_lights_punctual: punctual,
@@ -65,19 +88,20 @@ export function lightOf(gltf: Gltf, node: number, webs = NO_WEBS): NodeLight | u
   const color = ies.color ?? WHITE;
   const multiplier = { label: 'Multiplier', path: `${path}/multiplier`, value: ies.multiplier ?? 1 };
   const web = webs.get(ies.light);
-  const fields = [multiplier, ...inUnits(multiplier, 'Flux, lm', (web?.lumens ?? 0) * brightness(color))];
+  const bright = brightness(color);
+  const fields = [multiplier, ...inUnits(multiplier, 'Flux, lm', (web?.lumens ?? 0) * bright)];
   return {
     type: 'ies',
     color,
     colorPath: `${path}/color`,
-    fields: [...fields, ...inUnits(multiplier, 'Peak, cd', web?.candelaMost ?? 0)],
+    fields: [...fields, ...inUnits(multiplier, 'Peak, cd', (web?.candelaMost ?? 0) * bright)],
   };
 }
 
 /** Index in EXT_lights_ies of the web that a node shines by. */
 export function webOf(gltf: Gltf, node: number | undefined): number | undefined {
   const extensions = gltf.nodes?.[node ?? -1]?.extensions;
-  return lightOf(gltf, node ?? -1)?.type === 'ies' ? extensions?.EXT_lights_ies?.light : undefined;
+  return lookOf(gltf, node ?? -1)?.type === 'ies' ? extensions?.EXT_lights_ies?.light : undefined;
 }
 
 /** A field in another unit, which is `per` times its number; none where that is not known, or 0. */
@@ -116,18 +140,33 @@ function punctualLight(light: GltfLight, path: string): NodeLight {
       most: 1e6,
     });
   }
-  if (light.type === 'spot') {
-    const { inner, outer } = conesOf(light);
-    const cone = (label: string, member: string, angle: number): LightField => ({
-      label,
-      path: `${path}/spot/${member}`,
-      value: angle / DEGREE,
-      per: 1 / DEGREE,
-      most: 90,
-    });
-    fields.push(cone('Edge at, °', 'outerConeAngle', outer), cone('Full to, °', 'innerConeAngle', inner));
-  }
+  if (light.type === 'spot') fields.push(...coneFields(light, `${path}/spot`));
   return { type: light.type, color, colorPath: `${path}/color`, fields };
+}
+
+/** One at a time the cones might cross on the way, so each field writes both: the other angle gives way. */
+function coneFields(light: GltfLight, path: string): LightField[] {
+  const { inner, outer } = conesOf(light);
+  const gap = CONE_GAP * DEGREE;
+  const both = (innerConeAngle: number, outerConeAngle: number) => ({ ...light.spot, innerConeAngle, outerConeAngle });
+  const units = { path, per: 1 / DEGREE };
+  return [
+    {
+      ...units,
+      label: 'Edge at, °',
+      value: outer / DEGREE,
+      least: CONE_GAP,
+      most: 90,
+      written: (to) => both(Math.max(0, Math.min(inner, to - gap)), to),
+    },
+    {
+      ...units,
+      label: 'Full to, °',
+      value: inner / DEGREE,
+      most: 90 - CONE_GAP,
+      written: (to) => both(to, Math.min(Math.max(outer, to + gap), Math.PI / 2)),
+    },
+  ];
 }
 
 /** Width and height of an area light in metres; of a disc both are its diameter. `scale`: the largest of its node. */
@@ -169,6 +208,6 @@ const LIGHT_HANDLES: Partial<Record<LightType, readonly Handle[]>> = {
 /** The handles that change something about a node: a point light, for example, has no size and no direction. */
 export function handlesOf(gltf: Gltf, node: number): readonly Handle[] {
   const { mesh, children } = gltf.nodes?.[node] ?? {};
-  const type = lightOf(gltf, node)?.type;
+  const type = lookOf(gltf, node)?.type;
   return !type || mesh !== undefined || children?.length ? ALL_HANDLES : (LIGHT_HANDLES[type] ?? ALL_HANDLES);
 }

@@ -25,6 +25,15 @@ export function profileType(fileName: string): string {
   return /\.ldt$/i.test(fileName) ? 'application/x-eulumdat' : 'application/x-ies-lm-63';
 }
 
+/** Letters of a file's name that its lamp gets. */
+const MOST_NAME = 60;
+
+/** The name of a lamp with that photometric file. JSON cannot carry half of a letter: neither cut nor from a file. */
+export function profileName(fileName: string): string {
+  const letters = [...fileName.replace(/\.[^.]*$/, '').replace(/\p{Surrogate}/gu, '\ufffd')];
+  return letters.slice(0, MOST_NAME).join('');
+}
+
 const UPRIGHT: Vec4 = [0, 0, 0, 1];
 /** Turns -Z to -Y. */
 const DOWN: Vec4 = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2];

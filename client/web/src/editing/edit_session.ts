@@ -3,8 +3,8 @@
 import type { Object3D } from 'three';
 import * as edits from '../document/edits';
 import { type Gltf, hangingNodes, isSameScene, nodeName, type Vec3 } from '../document/gltf';
-import { handlesOf, lightOf, webOf, type LampWebs } from '../document/lights';
-import { addLamp, MOST_PROFILE_BYTES, profileType, type NewLamp } from '../document/new_lamps';
+import { handlesOf, lookOf, webOf, type LampWebs } from '../document/lights';
+import { addLamp, MOST_PROFILE_BYTES, profileName, profileType, type NewLamp } from '../document/new_lamps';
 import { addPlane, planeOf } from '../document/planes';
 import { setSkyPicture, setSkyTurn } from '../document/skies';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
@@ -42,9 +42,6 @@ export interface EditHost {
   /** The web of EXT_lights_ies that the selected lamp shines by; undefined: nothing like that is selected. */
   webWanted(gltf: Gltf, light: number | undefined): void;
 }
-
-/** Letters of a file's name that its lamp gets. */
-const MOST_NAME = 60;
 
 export class EditSession {
   readonly panel: ScenePanel;
@@ -148,7 +145,7 @@ export class EditSession {
     const { gltf } = this.document;
     const nodes = hangingNodes(gltf)
       .map(({ node }) => node)
-      .filter((node) => gltf.nodes?.[node]?.mesh !== undefined || lightOf(gltf, node));
+      .filter((node) => gltf.nodes?.[node]?.mesh !== undefined || lookOf(gltf, node));
     if (nodes.length === 0) return;
     const at = this.selection ? nodes.indexOf(this.selection.node) : -1;
     const node = nodes[at < 0 ? (step > 0 ? 0 : nodes.length - 1) : (at + step + nodes.length) % nodes.length]!;
@@ -229,8 +226,7 @@ export class EditSession {
       const uri = await this.host.upload(file);
       const ahead = this.ahead();
       const profile = { uri, bytes: file.size, mimeType: profileType(file.name) };
-      const name = file.name.replace(/\.[^.]*$/, '').slice(0, MOST_NAME);
-      if (ahead) await this.add(ahead.place, { type: 'ies', name, file: profile });
+      if (ahead) await this.add(ahead.place, { type: 'ies', name: profileName(file.name), file: profile });
     } catch (error) {
       toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
     }

@@ -76,23 +76,30 @@ export class Rpc {
 
   /** No more answers will come. */
   close(): void {
-    for (const { reject } of this.waiting.values()) reject(new ConnectionLost());
-    this.waiting.clear();
+    this.rejectAll(() => new ConnectionLost());
   }
 
   private take(message: unknown): void {
     if (typeof message !== 'object' || message === null) return;
     const { id, method, params, result, error } = message as Record<string, Json>;
     if (typeof method === 'string') return this.onNotification(method, params ?? {});
+    const refusal = error && typeof error === 'object' && !Array.isArray(error) ? refusalOf(error) : undefined;
+    // The server could not read a message, so it cannot tell which. None would wait for an answer that never comes.
+    if (id === null && refusal) return this.rejectAll(() => refusal);
     const waiting = typeof id === 'number' ? this.waiting.get(id) : undefined;
     if (!waiting) return;
     this.waiting.delete(id as number);
-    if (error && typeof error === 'object' && !Array.isArray(error)) {
-      waiting.reject(
-        new RpcError(Number(error['code']), String(error['message']), (error['data'] ?? {}) as RpcError['data']),
-      );
-    } else {
-      waiting.resolve(result);
-    }
+    if (refusal) waiting.reject(refusal);
+    else waiting.resolve(result);
   }
+
+  private rejectAll(error: () => Error): void {
+    const all = [...this.waiting.values()];
+    this.waiting.clear();
+    for (const { reject } of all) reject(error());
+  }
+}
+
+function refusalOf({ code, message, data }: { [member: string]: Json }): RpcError {
+  return new RpcError(Number(code), String(message), (data ?? {}) as RpcError['data']);
 }

@@ -1,4 +1,4 @@
-// Fetches the photometric webs of lamps that somebody looks at, each once.
+// Fetches the photometric webs of lamps that somebody looks at, each once, and seldom those that do not come.
 
 import type { Gltf } from '../document/gltf';
 import type { LampWeb, LampWebs } from '../document/lights';
@@ -12,7 +12,12 @@ export interface WebHost {
 interface Known {
   key: string;
   web?: LampWeb;
+  /** By the clock, milliseconds: it did not come. */
+  failed?: number;
 }
+
+/** A drag asks at each of its steps; what was just refused would be refused again. */
+const PAUSE_MS = 5000;
 
 export class WebFetch {
   private readonly known = new Map<number, Known>();
@@ -23,10 +28,15 @@ export class WebFetch {
     return new Map([...this.known].flatMap(([light, { web }]) => (web ? [[light, web] as const] : [])));
   }
 
-  /** `light`: index in EXT_lights_ies. Where the document names another file by it the web is fetched anew. */
+  /**
+   * `light`: index in EXT_lights_ies. Where the document names another file by it the web is fetched anew. One that did
+   * not come is asked for again after a pause.
+   */
   async want(gltf: Gltf, light: number | undefined): Promise<void> {
     const key = light === undefined ? undefined : keyOf(gltf, light);
-    if (light === undefined || key === undefined || this.known.get(light)?.key === key) return;
+    if (light === undefined || key === undefined) return;
+    const before = this.known.get(light);
+    if (before?.key === key && !(Date.now() - (before.failed ?? Infinity) >= PAUSE_MS)) return;
     const mine: Known = { key };
     this.known.set(light, mine);
     try {
@@ -35,8 +45,7 @@ export class WebFetch {
       mine.web = web;
       this.host.changed(this.webs);
     } catch {
-      // The lamp is shown without its web; the next who looks at it asks again.
-      if (this.known.get(light) === mine) this.known.delete(light);
+      mine.failed = Date.now(); // the lamp is shown without its web
     }
   }
 

@@ -1,9 +1,9 @@
 // Lamps in the panel "Scene": buttons that add them, and an editor of the selected one.
 
-import type { Vec3 } from '../document/gltf';
 import type { LightField, LightType, NodeLight } from '../document/lights';
 import { button, buttons, field, h, section } from '../page/dom';
 import { parseNumber } from '../page/numbers';
+import type { Json } from '../protocol/messages';
 
 /** Kinds of lamps that need no file. */
 export type PlainLamp = 'point' | 'spot' | 'rect' | 'disk';
@@ -12,7 +12,7 @@ export interface LampActions {
   addLamp(type: PlainLamp): void;
   /** .ies or .ldt */
   addProfile(file: File): void;
-  setLight(path: string, value: Vec3 | number): void;
+  setLight(path: string, value: Json): void;
 }
 
 /** Names for people of lights that the format has another one for. */
@@ -40,14 +40,18 @@ export function addLampButtons(actions: LampActions): HTMLElement {
 }
 
 /** The document's number for what was written into a field; undefined: the field does not accept it. */
-export function storedValue({ per = 1, most = Infinity }: LightField, text: string): number | undefined {
+export function storedValue({ per = 1, least = 0, most = Infinity }: LightField, text: string): number | undefined {
   const value = parseNumber(text);
-  if (!(value >= 0 && value <= most)) return undefined;
+  if (!(value >= least && value <= most)) return undefined;
   return per === 1 ? value : Number((value / per).toPrecision(STORED));
 }
 
 export function shownValue({ value }: LightField): string {
   return String(Number(value.toPrecision(SHOWN)));
+}
+
+function rangeOf({ least = 0, most }: LightField): string {
+  return most === undefined ? `a number, ${least} or more` : `a number from ${least} to ${most}`;
 }
 
 /** `colour`: the control of the light's colour; `refuse`: tells what is wanted, and restores the field. */
@@ -65,8 +69,8 @@ export function lightEditor(
       value: shownValue(of),
       onchange: () => {
         const wanted = storedValue(of, input.value);
-        if (wanted !== undefined) actions.setLight(of.path, wanted);
-        else refuse(input, of.most === undefined ? 'a number, 0 or more' : `a number from 0 to ${of.most}`);
+        if (wanted !== undefined) actions.setLight(of.path, of.written?.(wanted) ?? wanted);
+        else refuse(input, rangeOf(of));
       },
     });
     return field(of.label, input);

@@ -3,7 +3,7 @@
 import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
 import { hangingNodes, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
-import { handlesOf, lightOf, type Handle, type LampWebs, type NodeLight } from '../document/lights';
+import { handlesOf, lightOf, lookOf, type Handle, type LampWebs, type NodeLight } from '../document/lights';
 import type { Placement } from '../document/edits';
 import { fromHex, toHex } from '../page/colours';
 import { button, buttons, panel, checkbox, field, h, row, section } from '../page/dom';
@@ -154,7 +154,7 @@ export class ScenePanel {
       depth: Math.min(depth, 8),
       name: nodeName(this.gltf, node).slice(0, MOST_LETTERS),
       visible: isVisible(this.gltf, node),
-      light: lightOf(this.gltf, node) !== undefined,
+      light: lookOf(this.gltf, node) !== undefined,
     }));
     // A drag changes the document many times a second, but it does not change the list.
     const text = JSON.stringify([listed, found.length]);

@@ -70,6 +70,19 @@ TEST(LightWebOf, keepsBeamsOfWebsThatAreTooFineToDraw) {
   EXPECT_EQ(std::ranges::count(web->candela, 5000.0F), 1) << "a beam of a tenth of a degree";
 }
 
+TEST(LightWebOf, goesByTheBufferViewAsTheImportDoes) {
+  auto document = withFile(head(2, 1, 1) + "0 90\n0\n7 7\n");
+  auto& light = document.gltf["extensions"]["EXT_lights_ies"]["lights"][0];
+  ASSERT_TRUE(light.contains("bufferView"));
+  light["uri"] = encoded(head(2, 1, 1) + "0 90\n0\n1 1\n");
+  const auto web = lightWebOf(document, 0);
+  const auto scene = importScene(document);
+  ASSERT_TRUE(web) << web.error().text();
+  ASSERT_TRUE(scene) << scene.error().text();
+  EXPECT_EQ(web->most_candela, 7.0);
+  EXPECT_EQ(scene->lights.at(0).web->candela()[0], 7.0F);
+}
+
 TEST(LightWebOf, namesWhatIsNotThere) {
   const auto document = withFile(head(2, 1, 1) + "0 90\n0\n1 1\n");
   const auto web = lightWebOf(document, 1);

@@ -152,7 +152,7 @@ TEST(Ies, TypesAAndBThatEndBefore90AreDarkBeyond) {
   EXPECT_FLOAT_EQ(at(file, 59, 0), 0);
   EXPECT_FLOAT_EQ(at(file, 90, 41), 0);
   ies.vertical = {10, 20, 30};
-  EXPECT_THAT(refusal(ies.text()), HasSubstr("must go from -90 or 0 to 90"));
+  EXPECT_THAT(refusal(ies.text()), HasSubstr("must begin at 0 or below and end above 0"));
 }
 
 TEST(Ies, MultiplierAndBallastCountAndTheSecondFactorOnlyBefore2002) {

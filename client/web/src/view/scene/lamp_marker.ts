@@ -77,6 +77,8 @@ export class LampMarker extends Object3D {
     this.drawOutline(outline, selected);
     this.drawWeb(web);
     for (const lines of [this.outline, this.web]) lines.scale.setScalar(1 / size); // metres
+    // Mirrors do not mirror light: its axes are -Z and X of the node, and the third follows from them.
+    if (this.isMirrored()) this.web.scale.y *= -1;
     this.updateMatrixWorld(true);
   }
 
@@ -85,6 +87,11 @@ export class LampMarker extends Object3D {
     const above = this.parent?.getWorldScale(new Vector3()) ?? new Vector3(1, 1, 1);
     const inverse = (scale: number) => size / Math.max(Math.abs(scale), 1e-9);
     this.scale.set(inverse(above.x), inverse(above.y), inverse(above.z));
+  }
+
+  /** After scaleTo(), which brings the parent's matrix up to date. */
+  private isMirrored(): boolean {
+    return (this.parent?.matrixWorld.determinant() ?? 1) < 0;
   }
 
   /** A drag makes many documents, of which few have another outline. */

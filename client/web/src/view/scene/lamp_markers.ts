@@ -2,8 +2,8 @@
 
 import { Object3D } from 'three';
 import { isVisible } from '../../document/edits';
-import type { Gltf, GltfNode } from '../../document/gltf';
-import { lightOf, webOf, type LampWeb, type LampWebs } from '../../document/lights';
+import { parentsOf, type Gltf, type GltfNode } from '../../document/gltf';
+import { lookOf, webOf, type LampWeb, type LampWebs } from '../../document/lights';
 import { LampMarker } from './lamp_marker';
 import { outlineOf, webLines, type Lines } from './lamp_outline';
 
@@ -37,6 +37,7 @@ export class LampMarkers {
       anchor.removeFromParent();
       this.anchors.delete(node);
     }
+    const parents = parentsOf(gltf);
     for (const node of hanging) {
       const parent = nodes.get(node) ?? this.anchor(node, root, gltf.nodes?.[node] ?? {});
       let marker = this.markers.get(node);
@@ -44,8 +45,8 @@ export class LampMarkers {
       if (marker.parent !== parent) parent.add(marker);
       const selected = node === this.selected;
       const web = selected ? this.webs.get(webOf(gltf, node) ?? -1) : undefined;
-      const outline = outlineOf(gltf, node, CONE * diagonal);
-      const look = { light: lightOf(gltf, node)!, outline, web: web && this.linesOf(web, WEB * diagonal), selected };
+      const outline = outlineOf(gltf, node, CONE * diagonal, parents);
+      const look = { light: lookOf(gltf, node)!, outline, web: web && this.linesOf(web, WEB * diagonal), selected };
       marker.display(look, BALL * diagonal);
     }
   }
@@ -104,7 +105,7 @@ function hangingLights(gltf: Gltf): number[] {
   const out: number[] = [];
   const visit = (node: number, depth: number) => {
     if (depth > MOST_DEPTH || !isVisible(gltf, node)) return;
-    if (lightOf(gltf, node)) out.push(node);
+    if (lookOf(gltf, node)) out.push(node);
     for (const child of gltf.nodes?.[node]?.children ?? []) visit(child, depth + 1);
   };
   for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? []) visit(root, 0);

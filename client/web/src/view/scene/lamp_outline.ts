@@ -2,7 +2,7 @@
 // photometric web: a surface that is as far from the lamp in each direction as the lamp shines there. Pure functions.
 
 import { Vector3 } from 'three';
-import { largestScale, type Gltf, type GltfLight, type Vec3 } from '../../document/gltf';
+import { largestScale, type Gltf, type GltfLight, type Parents, type Vec3 } from '../../document/gltf';
 import { areaSize, conesOf, type LampWeb } from '../../document/lights';
 
 /** Ends of lines, two points each: x, y, z. */
@@ -28,12 +28,15 @@ function circle(radius: number, at: (u: number, v: number) => Vec3): Lines {
   return polyline(points, true);
 }
 
-/** In metres, in the node's axes. `reach`: length of what has none of its own, such as a cone. */
-export function outlineOf(gltf: Gltf, node: number, reach: number): Lines {
+/**
+ * In metres, in the node's axes. `reach`: length of what has none of its own, such as a cone. `parents`: parentsOf()
+ * the document; without, each area light is a pass over all nodes.
+ */
+export function outlineOf(gltf: Gltf, node: number, reach: number, parents?: Parents): Lines {
   const { KHR_lights_punctual: punctual, EXT_lights_area: area } = gltf.nodes?.[node]?.extensions ?? {};
   const panel = area && gltf.extensions?.EXT_lights_area?.lights[area.light];
   if (panel) {
-    const [width, height] = areaSize(panel, largestScale(gltf, node));
+    const [width, height] = areaSize(panel, largestScale(gltf, node, parents));
     if (panel.type === 'disk') return circle(width / 2, (x, y) => [x, y, 0]);
     const [x, y] = [width / 2, height / 2];
     return polyline(
