@@ -362,21 +362,17 @@ class PathTracer::Scene {
     const auto facing = shading_.mirror(triangle, u, v);
     if (!facing.any() && triangle.transmission <= 0.0) return std::nullopt;
     // The back of one side passes light; it reflects where that is all the front does.
-    const bool is_dark_back = hit.back && !triangle.double_sided && triangle.transmission < 0.999;
-    const double cosine = -glm::dot(direction, hit.point.normal);
-    const auto usual = facing.at(cosine);
+    const double lit = hit.back && !triangle.double_sided && triangle.transmission < 0.999 ? 0.0 : 1.0;
+    const auto usual = facing.at(-glm::dot(direction, hit.point.normal));
     const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
     if (random.uniform() < chance) {
-      part /= chance;
-      if (is_dark_back) part = glm::dvec3(0.0);
+      part *= lit / chance;
       return reflect(hit.point.normal, direction, facing, rough_mirrors_.at(triangle.mirror.roughness), part, random);
     }
     part /= 1.0 - chance;
     if (triangle.transmission <= 0.0) return std::nullopt;
-    const double passes = triangle.transmission * (1.0 - triangle.mirror.metallic);
-    if (random.uniform() >= passes) {
-      part /= 1.0 - triangle.transmission;  // which the reflectance has
-      if (is_dark_back) part = glm::dvec3(0.0);
+    if (random.uniform() >= triangle.transmission * (1.0 - triangle.mirror.metallic)) {
+      part *= lit / (1.0 - triangle.transmission);  // which the reflectance has
       return std::nullopt;
     }
     part *= shading_.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
@@ -384,8 +380,7 @@ class PathTracer::Scene {
   }
 
   [[nodiscard]] bool isBlackBack(const Hit& hit) const {
-    const auto& triangle = triangles()[hit.triangle];
-    return hit.back && !triangle.double_sided && triangle.transmission <= 0.0;
+    return hit.back && !triangles()[hit.triangle].double_sided && triangles()[hit.triangle].transmission <= 0.0;
   }
 
   void count(const std::optional<Hit>& first, Tally& tally) const {

@@ -20,7 +20,6 @@
 #include "server/scene/shading/emitters.h"
 #include "server/scene/shading/lit_sides.h"
 #include "server/scene/shading/opacity.h"
-#include "server/scene/shading/specular.h"
 #include "server/scene/values/lineage.h"
 #include "server/scene/values/material_of.h"
 
@@ -80,7 +79,6 @@ class Builder {
     for (Surface& surface : patches_.surfaces) {
       const Material& material = materialOf(scene_, surface);
       surface.see_through = isSeeThrough(material);
-      surface.glass = glassFace(material);
       const bool two_sided = surface.first_node[1] != kNone;
       hides.push_back(surface.see_through ? Hides::kNothing : two_sided ? Hides::kSheet : Hides::kSolid);
     }

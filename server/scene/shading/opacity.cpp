@@ -266,8 +266,11 @@ bool isSeeThrough(const Material& material) {
 
 void measureOpacity(const Scene& scene, PatchScene& patches) {
   std::vector<SurfaceOpacity> some;
-  for (Surface& surface : patches.surfaces)
-    if (surface.see_through) some.emplace_back(scene, patches, surface);
+  for (Surface& surface : patches.surfaces) {
+    if (!surface.see_through) continue;
+    surface.glass = glassFace(materialOf(scene, surface));
+    some.emplace_back(scene, patches, surface);
+  }
   chooseScales(patches, some);
   struct Rows {
     std::size_t of;

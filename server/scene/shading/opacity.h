@@ -11,8 +11,8 @@ namespace radiosity::scene {
 
 /// Fills the opacity grids of surfaces one can see through (Surface::see_through): MASK gives the part of a cell above
 /// the cutoff, BLEND alpha, transmission what a face does not let pass (specular.h); all of them multiplied. Grids
-/// together have at most 2^26 cells: beyond that they are coarser, with a warning. Needs vertices and triangle_source,
-/// too.
+/// together have at most 2^26 cells: beyond that they are coarser, with a warning. Fills
+/// Surface::glass, too. Needs vertices and triangle_source.
 void measureOpacity(const Scene& scene, PatchScene& patches);
 
 /// Multiplies the leaf areas of those surfaces by the opacity of the leaf; what is wholly cut out becomes empty.
