@@ -190,7 +190,10 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
 /// direct light does not come by way of mirrors.
 glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
   glm::dvec3 sum(0.0), part(1.0);
-  auto [value, end, direction, key, steps] = met;
+  auto value = met.value;
+  auto end = met.end;
+  auto direction = met.direction;
+  auto key = met.key;
   const auto isMirror = [&] { return mirrors_ && value < emission_.size() && mirrors_->has(value); };
   for (std::size_t hop = 0; hop < SpecularLeaves::kMostHops && isMirror(); ++hop) {
     key = mixKeys(key, 7 + hop);
@@ -200,7 +203,7 @@ glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
     direction = reflection.direction;
     const auto from = end;
     value = rays_->see(from, direction, key, end);
-    sum += part * leaving(value, end, key, steps);
+    sum += part * leaving(value, end, key, met.steps);
     if (value < lamp_emission_.size()) sum += part * glm::dvec3(lamp_emission_[value]);
   }
   return sum;
