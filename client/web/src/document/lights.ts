@@ -56,33 +56,36 @@ const OUTER_CONE = Math.PI / 4;
 /** Degrees between the cones of a spot, which KHR_lights_punctual wants apart. */
 const CONE_GAP = 0.1;
 
-/** What the light of a node is, if it has one. O(1). */
-export function lookOf(gltf: Gltf, node: number): LightLook | undefined {
+/** What extensions of a node name: by index a light that is there, and a web with what is told beside it. */
+function namedBy(gltf: Gltf, node: number) {
   const {
     KHR_lights_punctual: punctual,
     EXT_lights_area: area,
     EXT_lights_ies: ies,
   } = gltf.nodes?.[node]?.extensions ?? {};
   const { KHR_lights_punctual: lights, EXT_lights_area: areas } = gltf.extensions ?? {};
-  const light = (punctual && lights?.lights[punctual.light]) ?? (area && areas?.lights[area.light]);
+  return {
+    punctual: punctual && lights?.lights[punctual.light],
+    punctualPath: `/extensions/KHR_lights_punctual/lights/${punctual?.light}`,
+    area: area && areas?.lights[area.light],
+    areaPath: `/extensions/EXT_lights_area/lights/${area?.light}`,
+    ies,
+  };
+}
+
+/** What the light of a node is, if it has one. O(1). */
+export function lookOf(gltf: Gltf, node: number): LightLook | undefined {
+  const { punctual, area, ies } = namedBy(gltf, node);
+  const light = punctual ?? area;
   if (light) return { type: light.type, color: light.color ?? WHITE };
   return ies && { type: 'ies', color: ies.color ?? WHITE };
 }
 
 /** The light of a node, if it has one. A pass over all nodes where the light has an area: of many, ask lookOf(). */
 export function lightOf(gltf: Gltf, node: number, webs = NO_WEBS): NodeLight | undefined {
-  const {
-    KHR_lights_punctual: punctual,
-    EXT_lights_area: area,
-    EXT_lights_ies: ies,
-  } = gltf.nodes?.[node]?.extensions ?? {};
-  const { KHR_lights_punctual: lights, EXT_lights_area: areas } = gltf.extensions ?? {};
-  if (punctual && lights?.lights[punctual.light])
-    return punctualLight(lights.lights[punctual.light]!, `/extensions/KHR_lights_punctual/lights/${punctual.light}`);
-  if (area && areas?.lights[area.light]) {
-    const path = `/extensions/EXT_lights_area/lights/${area.light}`;
-    return areaLight(areas.lights[area.light]!, path, largestScale(gltf, node));
-  }
+  const { punctual, punctualPath, area, areaPath, ies } = namedBy(gltf, node);
+  if (punctual) return punctualLight(punctual, punctualPath);
+  if (area) return areaLight(area, areaPath, largestScale(gltf, node));
   if (!ies) return undefined;
   const path = `/nodes/${node}/extensions/EXT_lights_ies`;
   const color = ies.color ?? WHITE;
