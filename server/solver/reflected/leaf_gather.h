@@ -200,6 +200,8 @@ class LeafGather {
   void followMirrors(std::size_t half, const std::vector<Light>* source);
   [[nodiscard]] Light32 tintOf(const LeafSights::Step& step) const;
   [[nodiscard]] Light32 shotAt(std::size_t half, std::uint32_t end) const;
+  template <typename Met>
+  [[nodiscard]] std::vector<Light32> reflectedOf(std::size_t half, const Met& met) const;
   void takeMirrors(std::size_t half);
   [[nodiscard]] bool takesLight(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] double atGlass(std::size_t half, std::size_t value) const {

@@ -7,6 +7,8 @@
 namespace radiosity::solver {
 namespace {
 
+constexpr std::array<float, 4> kWhite{1.0F, 1.0F, 1.0F, 0.0F};
+
 /// Calls visit(leaf value, end, part of the leaf's rays) for each ray of a half.
 template <typename Visit>
 void inLeavesOf(const LeafSights& sights, std::size_t half, const Visit& visit) {
@@ -34,6 +36,23 @@ LeafGather::Light32 LeafGather::shotAt(std::size_t half, std::uint32_t end) cons
     end = LeafSights::leafOf(step);
   }
   return end < sights_.leafCount() ? halves_[half].shot[end] : Light32{};
+}
+
+/// By step of a mirror: what it reflects of what is met there, and of what the mirrors beyond reflect. `met(end)`: of
+/// where the ray ends, or goes on.
+template <typename Met>
+std::vector<LeafGather::Light32> LeafGather::reflectedOf(std::size_t half, const Met& met) const {
+  const auto ends = sights_.endCount();
+  const auto steps = sights_.steps(half);
+  std::vector<Light32> reflected(steps.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const auto& step = steps[i];
+    if (!SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
+    const Light32 here = met(step.next), beyond = step.next >= ends ? reflected[step.next - ends] : Light32{};
+    const auto tint = tintOf(step);
+    for (std::size_t c = 0; c < 3; ++c) reflected[i][c] = tint[c] * (here[c] + beyond[c]);
+  }
+  return reflected;
 }
 
 /// followSteps() where some steps are of mirrors.
@@ -84,16 +103,7 @@ void LeafGather::takeMirrors(std::size_t h) {
     const auto shot = light_.lamps[v] + light_.shot[h][v];
     half.shot[v] = {shot.x, shot.y, shot.z, 0.0F};
   }
-  std::vector<Light32> arrives(sights_.steps(h).size());
-  std::size_t i = 0;
-  for (const auto& step : sights_.steps(h)) {
-    auto& here = arrives[i++];
-    if (!SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
-    const Light32 beyond = step.next >= ends ? arrives[step.next - ends] : Light32{};
-    const float is_leaf = takesLight(h, step.next) ? 1.0F : 0.0F;
-    const auto tint = tintOf(step);
-    for (std::size_t c = 0; c < 3; ++c) here[c] = tint[c] * (beyond[c] + is_leaf);
-  }
+  const auto arrives = reflectedOf(h, [&](std::uint32_t end) { return takesLight(h, end) ? kWhite : Light32{}; });
   half.mirrored.resize(leaves);
   if (light_.mirrors->hasGlass()) half.at_glass.resize(leaves);
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
@@ -109,27 +119,16 @@ void LeafGather::takeMirrors(std::size_t h) {
 void LeafGather::takeMirroredSky(std::size_t h) {
   auto& half = halves_[h];
   const auto ends = sights_.endCount();
-  std::vector<Light32> sky(sights_.steps(h).size());
-  std::size_t i = 0;
-  for (const auto& step : sights_.steps(h)) {
-    auto& here = sky[i++];
-    if (!SpecularStep::is(step.by)) continue;
-    const auto tint = tintOf(step);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float beyond = step.next >= ends          ? sky[step.next - ends][c]
-                           : sights_.isSky(step.next) ? static_cast<float>(half.source[step.next][c])
-                                                      : 0.0F;
-      here[c] = tint[c] * beyond;
-    }
-  }
+  const auto skyOf = [&](std::uint32_t end) {
+    Light32 sky{};
+    for (std::size_t c = 0; c < 3 && sights_.isSky(end); ++c) sky[c] = static_cast<float>(half.source[end][c]);
+    return sky;
+  };
+  const auto reflected = reflectedOf(h, skyOf);
   half.sky.assign(sights_.leafCount(), {});
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float light = end >= ends          ? sky[end - ends][c]
-                          : sights_.isSky(end) ? static_cast<float>(half.source[end][c])
-                                               : 0.0F;
-      half.sky[v][c] += part * light;
-    }
+    const auto light = end >= ends ? reflected[end - ends] : skyOf(end);
+    for (std::size_t c = 0; c < 3; ++c) half.sky[v][c] += part * light[c];
   });
 }
 
@@ -149,22 +148,8 @@ void LeafGather::weighMirrors() {
   const auto ends = sights_.endCount();
   for (std::size_t h = 0; h < 2; ++h) {
     const auto& radiosity = halves_[h].radiosity;
-    struct Out {
-      Light32 sky{}, unlit{};
-    };
-    std::vector<Out> out(sights_.steps(h).size());
-    std::size_t i = 0;
-    for (const auto& step : sights_.steps(h)) {
-      auto& here = out[i++];
-      if (!SpecularStep::is(step.by)) continue;
-      const auto tint = tintOf(step);
-      const auto beyond = step.next >= ends ? out[step.next - ends] : Out{};
-      const float sky = sights_.isSky(step.next) ? 1.0F : 0.0F, unlit = sights_.isAbsorbed(step.next) ? 1.0F : 0.0F;
-      for (std::size_t c = 0; c < 3; ++c) {
-        here.sky[c] = tint[c] * (beyond.sky[c] + sky);
-        here.unlit[c] = tint[c] * (beyond.unlit[c] + unlit);
-      }
-    }
+    const auto to_sky = reflectedOf(h, [&](std::uint32_t end) { return sights_.isSky(end) ? kWhite : Light32{}; });
+    const auto unlit = reflectedOf(h, [&](std::uint32_t end) { return sights_.isAbsorbed(end) ? kWhite : Light32{}; });
     inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
       if (end < ends || !SpecularStep::is(sights_.steps(h)[end - ends].by)) return;
       const auto by = LeafSights::leafOf(sights_.steps(h)[end - ends]);
@@ -172,11 +157,11 @@ void LeafGather::weighMirrors() {
       for (std::size_t c = 0; c < 3; ++c) {
         const double share = 0.5 * areaOf(v) * static_cast<double>(part);
         const double sent = share * (static_cast<double>(radiosity[v][c]) + shot[c]);
-        const auto& leaves = out[end - ends];
-        escaped_[c] += sent * static_cast<double>(leaves.sky[c]);
-        absorbed_[c] += sent * static_cast<double>(leaves.unlit[c]);
-        mirrored_flux_[c] += sent * static_cast<double>(leaves.sky[c] + leaves.unlit[c]) +
-                             share * static_cast<double>(radiosity[end][c] - radiosity[by][c]);
+        const auto leaves = static_cast<double>(to_sky[end - ends][c]),
+                   dies = static_cast<double>(unlit[end - ends][c]);
+        escaped_[c] += sent * leaves;
+        absorbed_[c] += sent * dies;
+        mirrored_flux_[c] += sent * (leaves + dies) + share * static_cast<double>(radiosity[end][c] - radiosity[by][c]);
       }
     });
   }
