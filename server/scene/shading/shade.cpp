@@ -29,7 +29,7 @@ using Value = MaterialLayers::Value;
 
 /// Of a leaf's samples, by how much of the surface is there: the mean of what is everywhere the same is just that.
 struct Sum {
-  glm::dvec3 emission{0.0}, reflectance{0.0}, specular{0.0}, gloss{0.0};
+  glm::dvec3 emission{0.0}, reflectance{0.0}, specular{0.0}, lobe{0.0};
   double weight = 0.0;
 };
 
@@ -59,7 +59,7 @@ class MaterialShader {
       assign(first, side, reflectance_, out_.reflectance);
       if (out_.specular.sideCount() == 0) continue;
       assign(first, side, specular_, out_.specular);
-      assign(first, side, gloss_, out_.gloss);
+      assign(first, side, lobe_, out_.lobe);
     }
   }
 
@@ -83,10 +83,10 @@ class MaterialShader {
 
   /// What hardly reflects as a mirror does reflects all diffusely.
   static Value folded(Value value) {
-    if (std::max({value.specular.r, value.specular.g, value.specular.b}) >= kLeastSpecular || value.gloss.z > 0.0F)
+    if (std::max({value.specular.r, value.specular.g, value.specular.b}) >= kLeastSpecular || value.lobe.z > 0.0F)
       return value;
     value.reflectance = glm::min(value.reflectance + value.specular, glm::vec3(kMaxReflectance));
-    value.specular = value.gloss = glm::vec3(0.0F);
+    value.specular = value.lobe = glm::vec3(0.0F);
     return value;
   }
 
@@ -99,7 +99,7 @@ class MaterialShader {
       out_.reflectance.fill(side, value.reflectance);
       if (out_.specular.sideCount() == 0) continue;
       out_.specular.fill(side, value.specular);
-      out_.gloss.fill(side, value.gloss);
+      out_.lobe.fill(side, value.lobe);
     }
   }
 
@@ -133,7 +133,7 @@ class MaterialShader {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
-    for (auto* values : {&emission_, &reflectance_, &specular_, &gloss_}) values->resize(nodes);
+    for (auto* values : {&emission_, &reflectance_, &specular_, &lobe_}) values->resize(nodes);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t) {
       interruptionPoint();
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
@@ -144,7 +144,7 @@ class MaterialShader {
       if (sums_[i].weight > 0.0) {
         const auto& sum = sums_[i];
         value = {sum.emission / sum.weight, sum.reflectance / sum.weight, 1.0F, sum.specular / sum.weight,
-                 sum.gloss / sum.weight};
+                 sum.lobe / sum.weight};
       } else if (point.triangle != kNone) {
         value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
       }
@@ -152,7 +152,7 @@ class MaterialShader {
       emission_[i] = value.emission;
       reflectance_[i] = value.reflectance;
       specular_[i] = value.specular;
-      gloss_[i] = value.gloss;
+      lobe_[i] = value.lobe;
     }
   }
 
@@ -179,7 +179,7 @@ class MaterialShader {
         sums_[leaf].emission += glm::dvec3(value.emission) * weight;
         sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
         sums_[leaf].specular += glm::dvec3(value.specular) * weight;
-        sums_[leaf].gloss += glm::dvec3(value.gloss) * weight;
+        sums_[leaf].lobe += glm::dvec3(value.lobe) * weight;
         sums_[leaf].weight += weight;
       }
     }
@@ -221,7 +221,7 @@ class MaterialShader {
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
-  std::vector<glm::vec3> emission_, reflectance_, specular_, gloss_;  ///< by node of a side
+  std::vector<glm::vec3> emission_, reflectance_, specular_, lobe_;  ///< by node of a side
   bool was_clamped_ = false;
 };
 
@@ -232,7 +232,7 @@ namespace {
 /// Room for what reflects as mirrors do, once something does.
 void prepareSpecular(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& materials) {
   if (materials.specular.sideCount() > 0 || !isSpecular(materialOf(scene, material))) return;
-  materials.specular = materials.gloss = SideColours(patches);
+  materials.specular = materials.lobe = SideColours(patches);
 }
 
 /// `surfaces`: those of the material, one at least.

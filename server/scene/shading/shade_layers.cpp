@@ -90,21 +90,21 @@ void MaterialLayers::addSpecularLooks(TexturePyramids& pyramids) {
 /// holds also where both vary within the place.
 void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough,
                                  Value& value) const {
-  value.gloss.x = std::clamp(material_.roughness * rough, 0.0F, 1.0F);
+  value.lobe.x = std::clamp(material_.roughness * rough, 0.0F, 1.0F);
   if (isGlass(material_)) {
     const auto face = glassFace(material_);
     value.specular = glm::vec3(face.facing);
-    value.gloss.z = enteredPart(material_);
+    value.lobe.z = enteredPart(material_);
     // What is left of the light that neither passes nor is reflected, as a part of what does not pass.
     const float stopped = face.meanStopped(1.0F - passedPart(material_)),
                 reflected = face.meanStopped(face.reflectance(0.0F));
     value.reflectance *= stopped > 0.0F ? (1.0F - material_.transmission) * (1.0F - reflected) / stopped : 0.0F;
   } else if (material_.specular != glm::vec3(0.0F)) {
     value.specular = material_.specular * shine;
-    value.gloss.y = std::max({value.specular.r, value.specular.g, value.specular.b});
+    value.lobe.y = std::max({value.specular.r, value.specular.g, value.specular.b});
   } else {
     value.specular = glm::clamp(base - value.reflectance, 0.0F, 1.0F);
-    value.gloss.y = metal * material_.metallic;
+    value.lobe.y = metal * material_.metallic;
   }
 }
 

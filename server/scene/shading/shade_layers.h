@@ -17,7 +17,7 @@ class MaterialLayers {
   struct Value {
     glm::vec3 emission{0.0F}, reflectance{0.0F};
     float weight = 1.0F;  ///< how much of the surface is there: 0 where it is cut out, alpha where it is blended
-    glm::vec3 specular{0.0F}, gloss{0.0F};  ///< of PatchMaterials
+    glm::vec3 specular{0.0F}, lobe{0.0F};  ///< of PatchMaterials
   };
   /// Where a texture is looked up.
   struct Place {

@@ -272,10 +272,10 @@ void joinBoxes(std::vector<ChangedBox>& boxes);
 struct PatchMaterials {
   SideColours emission;
   SideColours reflectance;  ///< diffuse
-  /// Where surfaces reflect as mirrors do (specular.h): by how much of what comes straight at them, and, of `gloss`, x
-  /// their roughness, y by how much at a grazing angle, and z how much of what glass does not reflect passes (there the
-  /// law of Surface::glass is that of angles). No sides: nothing does.
-  SideColours specular, gloss;
+  /// Where surfaces reflect as mirrors do (specular.h): by how much of what comes straight at them, and, of `lobe`, x
+  /// the roughness, y the reflectance at a grazing angle, and z how much of what glass does not reflect passes (there
+  /// Surface::glass has the law of angles). No sides: nothing does.
+  SideColours specular, lobe;
   std::vector<std::string> warnings;
 };
 }  // namespace radiosity::scene

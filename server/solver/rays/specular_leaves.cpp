@@ -22,7 +22,7 @@ std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Sid
   std::size_t leaves = 0;
   for (const auto& side : sides) leaves += side.leaf_count;
   for (const auto& side : sides) {
-    const auto colours = materials.specular.side(side.number), gloss = materials.gloss.side(side.number);
+    const auto colours = materials.specular.side(side.number), lobe = materials.lobe.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (!reflects(colours[leaf])) {
         if (colours.isUniform()) break;
@@ -30,16 +30,16 @@ std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Sid
       }
       if (!found) found.reset(new SpecularLeaves(leaves));
       const auto value = side.first_value + leaf;
-      found->roughness_[value] = gloss[leaf].x;
-      found->colour_[value] = glm::vec4(colours[leaf], gloss[leaf].y);
+      found->roughness_[value] = lobe[leaf].x;
+      found->colour_[value] = glm::vec4(colours[leaf], lobe[leaf].y);
       if (const auto& face = surfaces[side.surface].glass; face.isGlass()) {
         found->glass_.resize(leaves);
-        found->glass_[value] = {face, gloss[leaf].z};
-        found->key_ = mixKeys(found->key_, bitsOf(gloss[leaf].z));
+        found->glass_[value] = {face, lobe[leaf].z};
+        found->key_ = mixKeys(found->key_, bitsOf(lobe[leaf].z));
       }
       const auto& colour = found->colour_[value];
       found->key_ = mixKeys(mixKeys(found->key_, bitsOf(colour.x) << 32U | bitsOf(colour.y)),
-                            mixKeys(bitsOf(colour.z) << 32U | bitsOf(colour.w), bitsOf(gloss[leaf].x) << 32U | value));
+                            mixKeys(bitsOf(colour.z) << 32U | bitsOf(colour.w), bitsOf(lobe[leaf].x) << 32U | value));
     }
   }
   return found;

@@ -82,7 +82,7 @@ TEST(Shade, MetalReflectsItsBaseColourAsAMirror) {
   const auto materials = shadedFloor(material);
   ASSERT_GT(materials.specular.sideCount(), 0U);
   EXPECT_EQ(materials.specular.side(0)[0], material.base_color);
-  EXPECT_EQ(materials.gloss.side(0)[0], glm::vec3(0.4F, 1.0F, 0.0F));
+  EXPECT_EQ(materials.lobe.side(0)[0], glm::vec3(0.4F, 1.0F, 0.0F));
   EXPECT_EQ(materials.reflectance.side(0)[0], glm::vec3(0.0F));
 }
 
@@ -114,7 +114,7 @@ TEST(Shade, WhatGlassReflectsAndPassesIsToldByItsInterface) {
   material.double_sided = true;
   const auto materials = shadedFloor(material);
   EXPECT_NEAR(materials.specular.side(0)[0].x, 0.04F, 1e-6F);
-  EXPECT_NEAR(materials.gloss.side(0)[0].z, 0.4F, 1e-6F) << "of what enters";
+  EXPECT_NEAR(materials.lobe.side(0)[0].z, 0.4F, 1e-6F) << "of what enters";
   // Of light from all around an interface reflects 0.04 + 0.96 / 21; of the rest 0.4 passes, and 0.2 x 0.5 is reflected
   // diffusely. The sum of 16 steps is that integral to 1 %.
   const float reflected = 0.04F + 0.96F / 21.0F;

@@ -22,12 +22,12 @@ class MirrorCube : public testing::Test {
   static constexpr std::uint32_t kMirror = 1;
 
   MirrorCube() : made_(makeQuadScene(cubeQuads(4, kDark, kGrey))), sides_(makeSides(*made_.patches)) {
-    made_.materials.specular = made_.materials.gloss = scene::SideColours(*made_.patches);
+    made_.materials.specular = made_.materials.lobe = scene::SideColours(*made_.patches);
     made_.materials.specular.fill(sides_[kMirror].number, glm::vec3(1.0F));
   }
 
   [[nodiscard]] std::shared_ptr<const SpecularLeaves> mirrors(float roughness) {
-    made_.materials.gloss.fill(sides_[kMirror].number, glm::vec3(roughness, 1.0F, 0.0F));
+    made_.materials.lobe.fill(sides_[kMirror].number, glm::vec3(roughness, 1.0F, 0.0F));
     return SpecularLeaves::find(sides_, made_.materials, made_.patches->surfaces);
   }
 
