@@ -20,13 +20,8 @@ namespace radiosity::test {
 [[nodiscard]] double irradiance(const scene::PatchScene& scene, const solver::FluxAccumulators& flux,
                                 std::uint32_t surface, std::uint32_t x, std::uint32_t y);
 
-class Gather : public ::testing::TestWithParam<gpu::Sight> {
+class Gather : public BothSights {
  protected:
-  void SetUp() override {
-    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
-    if (!made) GTEST_SKIP() << made.error().text();
-    transport_ = std::move(*made);
-  }
   solver::FluxAccumulators run(const std::shared_ptr<const scene::PatchScene>& scene, const solver::ShotBatch& batch) {
     EXPECT_TRUE(transport_->setScene(scene).has_value());
     auto flux = accumulators(*scene);
@@ -34,7 +29,6 @@ class Gather : public ::testing::TestWithParam<gpu::Sight> {
     EXPECT_TRUE(counters.has_value()) << counters.error().text();
     return flux;
   }
-  std::unique_ptr<solver::Transport> transport_;
 };
 
 }  // namespace radiosity::test

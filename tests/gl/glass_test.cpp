@@ -15,14 +15,8 @@ namespace {
 /// Of the angle between the light and the normals of floor and glass.
 constexpr double kCosine = 0.3;
 
-class Glass : public ::testing::TestWithParam<gpu::Sight> {
+class Glass : public BothSights {
  protected:
-  void SetUp() override {
-    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
-    if (!made) GTEST_SKIP() << made.error().text();
-    transport_ = std::move(*made);
-  }
-
   /// Of the light that would fall on a floor, how much does through a wide sheet above it that stops `straight` / 255
   /// of light straight at it.
   [[nodiscard]] double passes(scene::GlassFace face, std::uint8_t straight, bool faces_light) {
@@ -62,8 +56,6 @@ class Glass : public ::testing::TestWithParam<gpu::Sight> {
     }
     return sum / area;
   }
-
-  std::unique_ptr<solver::Transport> transport_;
 };
 
 double schlick(double facing) { return facing + (1.0 - facing) * std::pow(1.0 - kCosine, 5.0); }

@@ -45,13 +45,8 @@ scene::SharedWeb cosineWeb() {
   return webOf(polar, candela);
 }
 
-class Lamps : public ::testing::TestWithParam<gpu::Sight> {
+class Lamps : public BothSights {
  protected:
-  void SetUp() override {
-    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
-    if (!made) GTEST_SKIP() << made.error().text();
-    transport_ = std::move(*made);
-  }
   /// What the light brings in so many rounds, as their mean.
   void light(const scene::PunctualLight& light, std::uint32_t rounds = 1) {
     scene_ = builder_.build();
@@ -99,7 +94,6 @@ class Lamps : public ::testing::TestWithParam<gpu::Sight> {
   }
 
   SceneBuilder builder_;
-  std::unique_ptr<solver::Transport> transport_;
   std::shared_ptr<const scene::PatchScene> scene_;
   solver::FluxAccumulators flux_;
   double emitted_ = 0.0;

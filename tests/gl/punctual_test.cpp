@@ -41,13 +41,8 @@ std::uint32_t addFloor(SceneBuilder& builder, std::uint32_t texels = 16) {
   return builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, texels, texels});
 }
 
-class Punctual : public ::testing::TestWithParam<gpu::Sight> {
+class Punctual : public BothSights {
  protected:
-  void SetUp() override {
-    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
-    if (!made) GTEST_SKIP() << made.error().text();
-    transport_ = std::move(*made);
-  }
   solver::FluxAccumulators run(const std::shared_ptr<const scene::PatchScene>& scene, solver::ShotBatch batch) {
     batch.flux_scale = kFluxScale;
     EXPECT_TRUE(transport_->setScene(scene).has_value());
@@ -78,7 +73,6 @@ class Punctual : public ::testing::TestWithParam<gpu::Sight> {
       batch.parallel.push_back(shot);
     }
   }
-  std::unique_ptr<solver::Transport> transport_;
 };
 
 /// Irradiance of leaf (x, y), channel 0, both halves.
