@@ -310,7 +310,8 @@ std::string LightReport::unlit(double power, const solver::EnergyParts& energy, 
     return dark_count_ == 1 ? "the only lamp shines with nothing (see the warnings)"
                             : fmt::format("all {} lamps shine with nothing (see the warnings)", dark_count_);
   }
-  if (!is_solved || channelSum(energy.absorbed) > kNothing * channelSum(energy.emitted)) return {};
+  const auto arrives = channelSum(energy.absorbed) + channelSum(energy.specular);  // metal has light to show, too
+  if (!is_solved || arrives > kNothing * channelSum(energy.emitted)) return {};
   const bool on_backs = channelSum(energy.backface) > channelSum(energy.escaped);
   return on_backs ? "all of it ends on backs of faces, which are not lit" : "all of it leaves the scene";
 }

@@ -29,7 +29,7 @@ std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes)
   constexpr double kMebi = 1048576.0;
   switch (limit) {
     case solver::SolveLimit::kLinkMemory:
-      return fmt::format("the memory for links, {:.3g} MiB, is used up; --link-memory gives it more",
+      return fmt::format("the memory for links, {:.1f} MiB, is used up; --link-memory gives it more",
                          static_cast<double>(link_memory_bytes) / kMebi);
     case solver::SolveLimit::kPatches:
       return "every patch shoots for itself and no sample lowers the error any more; more texels would";

@@ -141,6 +141,13 @@ TEST_F(LostLight, WhereAllLightLeavesTheSceneThatIsSaid) {
   EXPECT_EQ(status().unlit, "all of it leaves the scene");
 }
 
+TEST_F(LostLight, WhereAllIsMetalLightArrives) {
+  auto scene = room();
+  for (auto& material : scene.materials) material.metallic = 1.0;
+  (void)warningsOf(with(std::move(scene), panel("lamp", 1.5)));
+  EXPECT_EQ(status().unlit, "");
+}
+
 TEST_F(LostLight, APointLightInsideASolidIsNamed) {
   auto scene = with(room(), panel("lamp", 1.9));
   test_scenes::Object block{"block", {}, {}};

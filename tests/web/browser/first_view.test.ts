@@ -5,7 +5,7 @@ import { converged, putScene, serveEach, squares, type GltfNode } from './harnes
 
 const { pages, serve } = serveEach();
 
-const PLASTER = { doubleSided: true, pbrMetallicRoughness: { baseColorFactor: [0.6, 0.6, 0.6, 1] } };
+const PLASTER = { doubleSided: true, pbrMetallicRoughness: { baseColorFactor: [0.6, 0.6, 0.6, 1], metallicFactor: 0 } };
 const LAMP = { emissiveFactor: [1, 1, 1] };
 const H = Math.SQRT1_2;
 
