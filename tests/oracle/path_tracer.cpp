@@ -203,6 +203,22 @@ class PathTracer::Scene {
     return shading_.reflectance(triangle, u, v);
   }
 
+  /// Of what leaves there the part that each bit of light contributes that arrives on the side where the path goes on:
+  /// on the same one, or, of what transmits diffusely, by chance on the other.
+  [[nodiscard]] glm::dvec3 scatteredAt(const Triangle& triangle, Point& at, Random& random) const {
+    const auto reflected = reflectanceAt(triangle, at.position);
+    if (!(triangle.diffuse_transmission > 0.0)) return reflected;
+    const auto [u, v] = Shading::weights(triangle, at.position);
+    const auto transmitted = shading_.transmittance(triangle, u, v);
+    const double both = reflected.x + reflected.y + reflected.z + transmitted.x + transmitted.y + transmitted.z;
+    if (!(both > 0.0)) return glm::dvec3(0.0);
+    const double through = (transmitted.x + transmitted.y + transmitted.z) / both;
+    if (random.uniform() >= through) return reflected / (1.0 - through);
+    at.normal = -at.normal;
+    at.shading = -at.shading;
+    return transmitted / through;
+  }
+
   /// Whether the point lies where its own surface is cut out.
   [[nodiscard]] bool onHole(const Point& point) const {
     const Point above{point.position + point.normal * (4.0 * kLift / rays_.scale()), -point.normal};
@@ -255,7 +271,7 @@ class PathTracer::Scene {
     const auto direction = way / std::sqrt(distance2);
     const double cos_at = glm::dot(direction, at.normal) > 0.0 ? glm::dot(direction, at.shading) : 0.0;
     double cos_light = -glm::dot(direction, light.normal);
-    if (cos_light < 0.0 && light.double_sided) {
+    if (cos_light < 0.0 && hasTwoSides(light)) {
       cos_light = -cos_light;
       y.normal = -y.normal;
     }
@@ -302,18 +318,18 @@ class PathTracer::Scene {
         return sum + throughput * (kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_) + mapByCosine(at, direction));
       if (isBlackBack(*hit)) return sum;
       sum += throughput * metByCosine(at, direction, *hit);
-      throughput *= reflectanceAt(triangles()[hit->triangle], hit->point.position);
+      at = hit->point;
+      throughput *= scatteredAt(triangles()[hit->triangle], at, random);
       const double survival = std::min(1.0, std::max({throughput.x, throughput.y, throughput.z}));
       if (survival <= 0.0) return sum;
       if (bounce >= 1) {
         if (random.uniform() >= survival) return sum;
         throughput /= survival;
       }
-      at = hit->point;
     }
   }
 
-  [[nodiscard]] bool isBlackBack(const Hit& hit) const { return hit.back && !triangles()[hit.triangle].double_sided; }
+  [[nodiscard]] bool isBlackBack(const Hit& hit) const { return hit.back && !hasTwoSides(triangles()[hit.triangle]); }
 
   void count(const std::optional<Hit>& first, Tally& tally) const {
     tally.open += first ? 0.0 : 1.0;

@@ -24,6 +24,10 @@ class Shading {
   [[nodiscard]] static std::pair<double, double> weights(const Triangle& triangle, const glm::dvec3& position);
 
   [[nodiscard]] glm::dvec3 reflectance(const Triangle& triangle, double u, double v) const;
+  /// The same as if nothing were transmitted diffusely: by what an engine that does not know of that multiplies light.
+  [[nodiscard]] glm::dvec3 baseReflectance(const Triangle& triangle, double u, double v) const;
+  /// Of light on the other side, what leaves diffusely on this one.
+  [[nodiscard]] glm::dvec3 transmittance(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] glm::dvec3 emission(const Triangle& triangle, double u, double v) const;  ///< lux
   [[nodiscard]] double opacity(const Triangle& triangle, double u, double v) const;
 
@@ -35,6 +39,8 @@ class Shading {
     return use.texture < 0 ? nullptr : &textures_[static_cast<std::size_t>(use.texture)];
   }
   [[nodiscard]] glm::dvec4 colour(const TextureUse& use, double u, double v) const;
+  [[nodiscard]] double diffusePart(const Triangle& triangle, double u, double v) const;
+  [[nodiscard]] double transmittedPart(const Triangle& triangle, double u, double v) const;
 
   std::vector<Triangle> triangles_;
   std::vector<Texture> textures_;

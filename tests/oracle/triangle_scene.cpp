@@ -27,6 +27,8 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
         const auto& [a, b, c] = triangle.corners;
         triangle.normal = glm::normalize(glm::cross(b - a, c - a));
         triangle.reflectance = material.reflectance;
+        triangle.diffuse_transmission = material.diffuse_transmission;
+        triangle.transmitted = material.transmitted;
         triangle.emission_lux = std::numbers::pi * material.emission_nits;
         triangle.alpha = material.opacity;
         triangle.see_through = material.opacity < 1.0;
@@ -82,7 +84,10 @@ bool sameMaterial(const Triangle& a, const Triangle& b) {
          a.specular == b.specular && a.base_colour.texture == b.base_colour.texture &&
          a.emissive.texture == b.emissive.texture && a.metal.texture == b.metal.texture &&
          a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
-         a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission;
+         a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission &&
+         a.diffuse_transmission == b.diffuse_transmission && a.transmitted == b.transmitted &&
+         a.transmission_part.texture == b.transmission_part.texture &&
+         a.transmission_colour.texture == b.transmission_colour.texture;
 }
 
 }  // namespace

@@ -15,6 +15,8 @@ struct Material {
   glm::dvec3 emission_nits{0.0};  ///< luminance of the front side
   double opacity = 1.0;           ///< below 1: alphaMode BLEND
   bool double_sided = false;
+  double diffuse_transmission = 0.0;  ///< KHR_materials_diffuse_transmission: its factor, and its colour
+  glm::dvec3 transmitted{1.0};
 };
 
 /// Convex, planar, counter-clockwise seen from the side that reflects and emits.

@@ -28,6 +28,7 @@ bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse us
 
 /// Which sides a surface has, and where one can see through it.
 bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  if (m.isTranslucent() != n.isTranslucent()) return false;
   if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode || m.transmission != n.transmission)
     return false;
   if (m.alpha_mode == AlphaMode::kOpaque) return true;
@@ -37,7 +38,11 @@ bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material
 
 bool sameShading(const Scene& a, const Material& m, const Scene& b, const Material& n) {
   return m.base_color == n.base_color && m.metallic == n.metallic && m.specular == n.specular &&
-         m.emission == n.emission && sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+         m.emission == n.emission && m.diffuse_transmission == n.diffuse_transmission &&
+         m.diffuse_transmission_color == n.diffuse_transmission_color &&
+         sameTexture(a, m.diffuse_transmission_texture, b, n.diffuse_transmission_texture) &&
+         sameTexture(a, m.diffuse_transmission_color_texture, b, n.diffuse_transmission_color_texture) &&
+         sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
          sameTexture(a, m.metallic_texture, b, n.metallic_texture) &&
          sameTexture(a, m.specular_texture, b, n.specular_texture) &&
          sameTexture(a, m.emissive_texture, b, n.emissive_texture);

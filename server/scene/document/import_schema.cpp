@@ -202,6 +202,10 @@ constexpr Member kPbr[] = {numbers("baseColorFactor", 4, -kSlack, 1 + kSlack), o
 constexpr Member kEmissiveStrength[] = {number("emissiveStrength", 0)};
 constexpr Member kTransmission[] = {number("transmissionFactor", -kSlack, 1 + kSlack),
                                     object("transmissionTexture", kTextureInfo)};
+constexpr Member kDiffuseTransmission[] = {number("diffuseTransmissionFactor", -kSlack, 1 + kSlack),
+                                           object("diffuseTransmissionTexture", kTextureInfo),
+                                           numbers("diffuseTransmissionColorFactor", 3, -kSlack, 1 + kSlack),
+                                           object("diffuseTransmissionColorTexture", kTextureInfo)};
 constexpr Member kSpecularGlossiness[] = {
     numbers("diffuseFactor", 4, -kSlack, 1 + kSlack), object("diffuseTexture", kTextureInfo),
     numbers("specularFactor", 3, -kSlack, 1 + kSlack), number("glossinessFactor", -kSlack, 1 + kSlack),
@@ -209,6 +213,7 @@ constexpr Member kSpecularGlossiness[] = {
 constexpr Member kNoMembers[] = {string("name")};
 constexpr Member kMaterialExtensions[] = {
     object("KHR_materials_emissive_strength", kEmissiveStrength), object("KHR_materials_transmission", kTransmission),
+    object("KHR_materials_diffuse_transmission", kDiffuseTransmission),
     object("KHR_materials_pbrSpecularGlossiness", kSpecularGlossiness), object("KHR_materials_unlit", kNoMembers)};
 constexpr Member kMaterial[] = {string("name"),
                                 object("pbrMetallicRoughness", kPbr),
@@ -439,28 +444,6 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 17> kSupported = {"EXT_lights_area",
-                                                         "EXT_lights_ies",
-                                                         "EXT_lights_image_based",
-                                                         "EXT_mesh_gpu_instancing",
-                                                         "EXT_meshopt_compression",
-                                                         "EXT_texture_webp",
-                                                         "KHR_draco_mesh_compression",
-                                                         "KHR_environment_map",
-                                                         "KHR_lights_punctual",
-                                                         "KHR_materials_emissive_strength",
-                                                         "KHR_materials_pbrSpecularGlossiness",
-                                                         "KHR_materials_transmission",
-                                                         "KHR_materials_unlit",
-                                                         "KHR_mesh_quantization",
-                                                         "KHR_meshopt_compression",
-                                                         "KHR_node_visibility",
-                                                         "KHR_texture_transform"};
-
-bool isSupported(const std::string& extension) {
-  return std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
-}
-
 }  // namespace
 
 Result<void> checkSchema(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
@@ -473,25 +456,6 @@ Result<void> checkSchema(const Json& gltf, const std::string& name, std::vector<
 Result<void> checkMaterials(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
   static constexpr Member kAlone[] = {objects("materials", kMaterial)};
   return Checker(gltf, name, warnings).objectAt(gltf, kAlone, "");
-}
-
-Result<void> checkExtensions(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
-  const auto list = [&](const char* member) { return gltf.contains(member) ? gltf[member] : Json::array(); };
-  const auto required = list("extensionsRequired");
-  for (std::size_t i = 0; i < required.size(); ++i) {
-    const auto extension = required[i].get<std::string>();
-    if (isSupported(extension)) continue;
-    return fail(ErrorCode::kUnsupported,
-                "the file requires " + extension + ", which is not supported; export without it",
-                place(name, "/extensionsRequired/" + std::to_string(i)));
-  }
-  const auto used = list("extensionsUsed");
-  for (std::size_t i = 0; i < used.size(); ++i) {
-    const auto extension = used[i].get<std::string>();
-    if (isSupported(extension)) continue;
-    warnings.push_back(place(name, "/extensionsUsed/" + std::to_string(i)) + ": " + extension + " is ignored");
-  }
-  return {};
 }
 
 }  // namespace radiosity::scene

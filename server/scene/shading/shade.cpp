@@ -26,9 +26,22 @@ constexpr int kSide = 4;  ///< kSide^2 samples a leaf
 
 using Value = MaterialLayers::Value;
 
+/// What PatchMaterials has of a node: its members in their order.
+constexpr std::size_t kColours = 4, kOfAll = 2;  ///< the first two of all materials, the others of translucent ones
+template <typename Colour>
+using Colours = std::array<Colour, kColours>;
+
+Colours<SideColours*> coloursOf(PatchMaterials& materials) {
+  return {&materials.emission, &materials.reflectance, &materials.transmittance, &materials.base_reflectance};
+}
+
+Colours<glm::vec3> coloursOf(const Value& value) {
+  return {value.emission, value.reflectance, value.transmittance, value.base_reflectance};
+}
+
 /// Of a leaf's samples, by how much of the surface is there: the mean of what is everywhere the same is just that.
 struct Sum {
-  glm::dvec3 emission{0.0}, reflectance{0.0};
+  Colours<glm::dvec3> colours{};
   double weight = 0.0;
 };
 
@@ -40,7 +53,11 @@ class MaterialShader {
         patches_(patches),
         out_(out),
         name_(materialOf(scene, material).name),
-        layers_(scene, materialOf(scene, material), pyramids) {}
+        colours_(materialOf(scene, material).isTranslucent() ? kColours : kOfAll),
+        layers_(scene, materialOf(scene, material), pyramids) {
+    for (std::size_t i = 0; i < colours_; ++i)
+      if (coloursOf(out)[i]->sideCount() == 0) *coloursOf(out)[i] = SideColours(patches);
+  }
 
   void shade(std::uint32_t id) {
     surface_ = patches_.surfaces[id];
@@ -55,23 +72,25 @@ class MaterialShader {
       if (first == kNone) continue;
       average(first);
       const auto side = out_.emission.sideOf(first);
-      out_.emission.assign(side, emission_);
-      out_.reflectance.assign(side, reflectance_);
+      for (std::size_t i = 0; i < coloursHere(); ++i) coloursOf(out_)[i]->assign(side, nodes_[i]);
     }
   }
 
   [[nodiscard]] bool wasClamped() const { return was_clamped_; }
+  [[nodiscard]] bool isTranslucent() const { return colours_ > kOfAll; }
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
   Value clamped(Value value) {
     for (int c = 0; c < 3; ++c) {
-      float& rho = value.reflectance[c];
-      if (rho > kMaxReflectance) {
+      float &rho = value.reflectance[c], &tau = value.transmittance[c];
+      if (const float sum = rho + tau; sum > kMaxReflectance) {
         was_clamped_ = true;
-        rho = kMaxReflectance;
+        rho = tau > 0.0F ? rho * (kMaxReflectance / sum) : kMaxReflectance;
+        tau *= kMaxReflectance / sum;
       }
       if (!(rho > 0.0F)) rho = 0.0F;
+      if (!(tau > 0.0F)) tau = 0.0F;
       if (!(value.emission[c] > 0.0F) || !std::isfinite(value.emission[c])) value.emission[c] = 0.0F;
     }
     return value;
@@ -81,9 +100,13 @@ class MaterialShader {
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
       const auto side = out_.emission.sideOf(first);
-      out_.emission.fill(side, value.emission);
-      out_.reflectance.fill(side, value.reflectance);
+      for (std::size_t i = 0; i < coloursHere(); ++i) coloursOf(out_)[i]->fill(side, coloursOf(value)[i]);
     }
+  }
+
+  /// What would pass to a side without patches is absorbed.
+  [[nodiscard]] std::size_t coloursHere() const {
+    return surface_.first_node[0] != kNone && surface_.first_node[1] != kNone ? colours_ : kOfAll;
   }
 
   [[nodiscard]] glm::vec2 uvAt(const TextureUse& use, const ChartCorners& c, const glm::vec3& w) const {
@@ -116,22 +139,21 @@ class MaterialShader {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
-    emission_.resize(nodes);
-    reflectance_.resize(nodes);
+    for (auto& of_nodes : nodes_) of_nodes.resize(nodes);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t) {
       interruptionPoint();
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
     }
     for (std::size_t i = 0; i < count; ++i) {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
-      Value value;
-      if (sums_[i].weight > 0.0) {
-        value = {sums_[i].emission / sums_[i].weight, sums_[i].reflectance / sums_[i].weight};
+      Colours<glm::vec3> colours{};
+      if (const auto& sum = sums_[i]; sum.weight > 0.0) {
+        for (std::size_t k = 0; k < kColours; ++k) colours[k] = sum.colours[k] / sum.weight;
       } else if (point.triangle != kNone) {
-        value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
+        const auto corners = cornersOf(patches_, point.triangle, *instance_, *primitive_);
+        colours = coloursOf(clamped(valueAt(corners, glm::dvec2(point.texel))));
       }
-      emission_[i] = value.emission;
-      reflectance_[i] = value.reflectance;
+      for (std::size_t k = 0; k < kColours; ++k) nodes_[k][i] = colours[k];
     }
   }
 
@@ -155,8 +177,8 @@ class MaterialShader {
         if (!(found.weight > 0.0F)) continue;  // nothing is there
         const Value value = clamped(found);
         const double weight = value.weight;
-        sums_[leaf].emission += glm::dvec3(value.emission) * weight;
-        sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
+        const auto colours = coloursOf(value);
+        for (std::size_t i = 0; i < colours_; ++i) sums_[leaf].colours[i] += glm::dvec3(colours[i]) * weight;
         sums_[leaf].weight += weight;
       }
     }
@@ -169,19 +191,18 @@ class MaterialShader {
       const LevelGrid grid = levelGrid(surface_.width, surface_.height, level);
       for (std::uint32_t y = 0; y < grid.height; ++y)
         for (std::uint32_t x = 0; x < grid.width; ++x) {
-          glm::dvec3 emission(0.0), reflectance(0.0);
+          Colours<glm::dvec3> sums{};
           double weight = 0.0;
           for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, below.height); ++cy)
             for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, below.width); ++cx) {
               const std::uint32_t child = below.offset + cy * below.width + cx;
               const double area = patches_.node_area[first + child];
               weight += area;
-              emission += glm::dvec3(emission_[child]) * area;
-              reflectance += glm::dvec3(reflectance_[child]) * area;
+              for (std::size_t i = 0; i < colours_; ++i) sums[i] += glm::dvec3(nodes_[i][child]) * area;
             }
           const std::uint32_t node = grid.offset + y * grid.width + x;
-          emission_[node] = weight > 0.0 ? glm::vec3(emission / weight) : glm::vec3(0.0F);
-          reflectance_[node] = weight > 0.0 ? glm::vec3(reflectance / weight) : glm::vec3(0.0F);
+          for (std::size_t i = 0; i < colours_; ++i)
+            nodes_[i][node] = weight > 0.0 ? glm::vec3(sums[i] / weight) : glm::vec3(0.0F);
         }
       below = grid;
     }
@@ -191,12 +212,13 @@ class MaterialShader {
   const PatchScene& patches_;
   PatchMaterials& out_;
   std::string name_;
+  std::size_t colours_;  ///< that the material has
   MaterialLayers layers_;
   Surface surface_;
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
-  std::vector<glm::vec3> emission_, reflectance_;  ///< by node of a side
+  Colours<std::vector<glm::vec3>> nodes_;  ///< by node of a side
   bool was_clamped_ = false;
 };
 
@@ -210,8 +232,9 @@ void shadeSurfaces(const Scene& scene, const PatchScene& patches, std::uint32_t 
   MaterialShader shader(scene, patches, material, pyramids, materials);
   for (const std::uint32_t s : surfaces) shader.shade(s);
   if (shader.wasClamped())
-    materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance above {} was lowered to it", material,
-                                             shader.name(), kMaxReflectance));
+    materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance{} above {} was lowered to it", material,
+                                             shader.name(), shader.isTranslucent() ? " and transmittance" : "",
+                                             kMaxReflectance));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ MaterialLayers::MaterialLayers(const Scene& scene, const Material& material, Tex
     : scene_(scene), material_(material) {
   addSurface(pyramids);
   if (material_.emission != glm::vec3(0.0F)) addEmissive(pyramids);
+  if (material_.isTranslucent()) addTransmission(pyramids);
 }
 
 const Texture* MaterialLayers::textureOf(const TextureUse& use) const {
@@ -47,8 +48,10 @@ void MaterialLayers::addSurface(TexturePyramids& pyramids) {
   const TextureUse& use = base != nullptr       ? material_.base_color_texture
                           : metallic != nullptr ? material_.metallic_texture
                                                 : material_.specular_texture;
-  metallic_inside_ = metallic != nullptr && laidAlike(material_.metallic_texture, use);
-  specular_inside_ = specular != nullptr && laidAlike(material_.specular_texture, use);
+  // Metal takes from transmitted light, too, which has a colour of its own.
+  const bool joins = !material_.isTranslucent();
+  metallic_inside_ = joins && metallic != nullptr && laidAlike(material_.metallic_texture, use);
+  specular_inside_ = joins && specular != nullptr && laidAlike(material_.specular_texture, use);
   if (metallic != nullptr && !metallic_inside_)
     metallic_.emplace(Layer{material_.metallic_texture, pyramids.of({.colour = metallic})});
   if (specular != nullptr && !specular_inside_)
@@ -76,6 +79,13 @@ void MaterialLayers::addEmissive(TexturePyramids& pyramids) {
   PictureStack stack{.colour = light};
   if (covered) setAlpha(base, stack);
   emissive_.emplace(Layer{material_.emissive_texture, pyramids.of(stack)});
+}
+
+void MaterialLayers::addTransmission(TexturePyramids& pyramids) {
+  if (const Texture* part = textureOf(material_.diffuse_transmission_texture))
+    passing_.emplace(Layer{material_.diffuse_transmission_texture, pyramids.of({.alpha = part})});
+  if (const Texture* colour = textureOf(material_.diffuse_transmission_color_texture))
+    glow_.emplace(Layer{material_.diffuse_transmission_color_texture, pyramids.of({.colour = colour})});
 }
 
 }  // namespace radiosity::scene

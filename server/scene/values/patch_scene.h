@@ -251,6 +251,12 @@ void joinBoxes(std::vector<ChangedBox>& boxes);
 struct PatchMaterials {
   SideColours emission;
   SideColours reflectance;
+  /// Of the irradiance of a node's other side the part that leaves on this one: B = E + rho H + tau H_other. rho + tau
+  /// is at most 0.999. Empty (no sides): nothing in the scene is translucent.
+  SideColours transmittance;
+  /// Where `transmittance` is not black: reflectance as the material would have it without diffuse transmission, by
+  /// which renderers that do not know the extension multiply lightmaps. Empty likewise.
+  SideColours base_reflectance;
   std::vector<std::string> warnings;
 };
 }  // namespace radiosity::scene

@@ -39,7 +39,9 @@ std::uint64_t LinkedSolver::lightKey() const {
   std::uint64_t sources = 0;  // in whatever order
   for (const auto& source : sources_) sources += keyOf(source);
   for (const auto& source : sky_) sources += keyOf(source);
-  return mixKeys(mixKeys(keyOf(system_.emission(), sides_), keyOf(system_.reflectance(), sides_)), sources);
+  auto key = mixKeys(mixKeys(keyOf(system_.emission(), sides_), keyOf(system_.reflectance(), sides_)), sources);
+  if (!system_.passing().empty()) key = mixKeys(key, keyOf(system_.transmittance(), sides_));
+  return key;
 }
 
 /// What it ended with for this light before, if that reaches the target. False: there is no such end.

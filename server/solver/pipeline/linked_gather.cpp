@@ -166,6 +166,7 @@ LeftLight LinkedSolver::leftLight() const {
   light.residual = std::clamp(kResidual * settings_.target_error, kLeastResidual, kMostResidual);
   light.emission = shiningOfLeaves();
   light.reflectance = ofLeaves(system_.reflectance());
+  light.passing.assign(system_.passing().begin(), system_.passing().end());
   light.irradiance = over_links_;
   SkyLight sky(sky_);
   light.sky = sky.hemispheres;
