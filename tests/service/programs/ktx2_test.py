@@ -65,6 +65,7 @@ class Ktx2Test(ServiceCase):
 
     def test_areRefusedByTheServerWithTheirName(self):
         scene = json.loads(self.write_scene("room.gltf", make_ktx2(RED)).read_text())
+        scene["images"][0]["uri"] = "data:image/ktx2;base64," + base64.b64encode(make_ktx2(RED)).decode()
         server = self.server()
         request = urllib.request.Request(f"http://127.0.0.1:{server.port}/scene?name=room.gltf",
                                          json.dumps(scene).encode(), {"Content-Type": "model/gltf+json"}, method="PUT")
