@@ -200,8 +200,8 @@ json document(const TestScene& scene, Writer& writer) {
   std::set<std::string> used;
   for (const auto& material : scene.materials) {
     gltf["materials"].push_back(materialJson(material));
-    for (const auto& [extension, value] : gltf["materials"].back().value("extensions", json::object()).items())
-      used.insert(extension);
+    const auto extensions = gltf["materials"].back().value("extensions", json::object());
+    for (const auto& [extension, value] : extensions.items()) used.insert(extension);
   }
   if (!used.empty()) gltf["extensionsUsed"] = used;
   for (const auto& object : scene.objects) {
