@@ -74,7 +74,9 @@ TEST_P(Translucent, ASheetBetweenALitAndADarkCubeSendsItsTransmittanceOn) {
   const auto loaded = load(twoCubes(sheetOf(0.8, 0.6, {0.9, 0.5, 0.25}), {"lit", glm::dvec3(0.0), glm::dvec3(1.0)},
                                     {"dark", glm::dvec3(0.0), glm::dvec3(0.0)}),
                            3000);
-  Solve solve(loaded, settingsOf(GetParam(), GetParam() == Method::kGather ? 0.01 : 0.02));
+  Solve solve(loaded, settingsOf(GetParam(), GetParam() == Method::kPaper    ? 0.005
+                                             : GetParam() == Method::kGather ? 0.01
+                                                                             : 0.02));
   ASSERT_TRUE(solve.run());
   expectSound(solve);
   const auto front = meanOf(solve, loaded, kSheet, true), back = meanOf(solve, loaded, kSheet, false);
@@ -87,8 +89,8 @@ TEST_P(Translucent, ASheetBetweenALitAndADarkCubeSendsItsTransmittanceOn) {
     EXPECT_NEAR(5.0 * second[c], tau[c] * kPi, off * tau[c] * kPi) << c;
   }
   const auto energy = solve.solver().energy();
-  const double absorbed = energy.absorbed[0] / energy.emitted[0];
-  EXPECT_NEAR(absorbed, 1.0, 0.01) << "a closed scene keeps its light";
+  const double kept = (energy.absorbed[0] + energy.unshot[0]) / energy.emitted[0];
+  EXPECT_NEAR(kept, 1.0, 0.01) << "a closed scene keeps its light";
 }
 
 // The same light on both sides, and as much of it sent on as walls reflect: nobody can tell that there is a sheet.
@@ -96,12 +98,12 @@ TEST_P(Translucent, AFurnaceDividedByASheetIsStillAFurnace) {
   const double rho = 0.7, factor = 0.5;  // reflects 0.35 of the light, lets 0.35 through
   const test_scenes::Material wall{"wall", glm::dvec3(rho), glm::dvec3(1.0)};
   const auto loaded = load(twoCubes(sheetOf(rho, factor, glm::dvec3(rho), 1.0), wall, wall), 3000);
-  Solve solve(loaded, settingsOf(GetParam(), GetParam() == Method::kGather ? 0.005 : 0.05));
+  Solve solve(loaded, settingsOf(GetParam(), GetParam() == Method::kShooting ? 0.05 : 0.005));
   ASSERT_TRUE(solve.run());
   expectSound(solve);
   const auto off = compareToConstant(solve, kPi / (1.0 - rho));
   EXPECT_LT(std::abs(off.mean), GetParam() == Method::kGather ? 1e-5 : 0.03);
-  EXPECT_LT(off.rms, GetParam() == Method::kGather ? 0.005 : 0.1);
+  EXPECT_LT(off.rms, GetParam() == Method::kGather ? 0.005 : 0.15) << "the other two have the noise of their images";
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Translucent, testing::Values(Method::kGather, Method::kShooting, Method::kPaper),
