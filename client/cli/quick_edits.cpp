@@ -10,6 +10,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/editor.h"
+#include "client/cli/ktx2.h"
 #include "client/cli/model_merge.h"
 #include "client/cli/scene_edits.h"
 #include "client/cli/scene_file.h"
@@ -167,13 +168,15 @@ struct AddOptions {
 Result<Model> readModel(const std::string& path) {
   const auto kind = sceneKind(path);
   if (!kind) return tl::unexpected(kind.error());
+  const auto scene = withoutKtx2(path);
+  if (!scene) return tl::unexpected(scene.error());
   if (*kind == SceneKind::kGlb) {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file(scene->path(), std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(file), {}};
     if (file.bad()) return fail(ErrorCode::kBadInput, "cannot be read", path);
     return splitModel(bytes, path);
   }
-  const auto text = inlineExternalFiles(path);
+  const auto text = inlineExternalFiles(scene->path());
   if (!text) return tl::unexpected(text.error());
   return Model{Json::parse(*text, nullptr, false), {}};
 }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "client/cli/interrupt.h"
+#include "client/cli/ktx2.h"
 #include "client/cli/scene_file.h"
 #include "protocol/http_bodies.h"
 
@@ -167,19 +168,21 @@ Result<Loaded> uploadScene(const Remote& remote, const std::string& path, const 
                            ProgressDisplay& display) {
   const auto kind = sceneKind(path);
   if (!kind) return tl::unexpected(kind.error());
+  const auto scene = withoutKtx2(path);
+  if (!scene) return tl::unexpected(scene.error());
   auto http = remote.http();
   http.progress = showTransfer(display, "uploading " + path);
   const std::string target = "/scene?name=" + client::percentEncode(std::filesystem::path(path).filename().string());
   Result<client::HttpReply> reply = client::HttpReply{};
   if (sky.isOfScene()) {
-    auto made = withSky(path, sky);
+    auto made = withSky(scene->path(), sky);
     if (!made) return tl::unexpected(made.error());
     reply = client::httpPutText(http, target, made->is_glb ? "model/gltf-binary" : "model/gltf+json",
                                 std::move(made->bytes));
   } else if (*kind == SceneKind::kGlb) {
-    reply = client::httpPutFile(http, target, "model/gltf-binary", path);
+    reply = client::httpPutFile(http, target, "model/gltf-binary", scene->path());
   } else {
-    auto text = inlineExternalFiles(path);
+    auto text = inlineExternalFiles(scene->path());
     if (!text) return tl::unexpected(text.error());
     reply = client::httpPutText(http, target, "model/gltf+json", std::move(*text));
   }

@@ -10,6 +10,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/ktx2.h"
 #include "client/cli/measure.h"
 #include "client/cli/remote.h"
 #include "client/cli/report.h"
@@ -99,7 +100,7 @@ class Solve {
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
-      by_path_ = *external;
+      by_path_ = *external && !mayHaveKtx2(options_.scene);
     }
     return checkOutputs({options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
   }

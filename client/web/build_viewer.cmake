@@ -24,7 +24,7 @@ else()
 endif()
 
 set(types html "text/html; charset=utf-8" js "text/javascript; charset=utf-8" css "text/css; charset=utf-8"
-  svg "image/svg+xml" json "application/json")
+  svg "image/svg+xml" json "application/json" wasm "application/wasm")
 file(GLOB_RECURSE files RELATIVE ${FOLDER} ${FOLDER}/*)
 list(FILTER files EXCLUDE REGEX "\\.gz$")
 list(SORT files)

@@ -21,12 +21,22 @@ function packed(): Plugin {
   };
 }
 
+/** The transcoder of Basis Universal as a module: three.js ships it as a script that names BASIS. */
+function basisModule(): Plugin {
+  return {
+    name: 'basis-module',
+    enforce: 'pre',
+    transform: (code, id) => (id.endsWith('/basis_transcoder.js') ? `${code}\nexport default BASIS;` : undefined),
+  };
+}
+
 const server = process.env['RADIOSITY_SERVER'] ?? 'http://127.0.0.1:8765';
 const routes = ['/scene', '/lightmaps', '/snapshot', '/status', '/uploads'];
 
 export default defineConfig({
-  plugins: [packed()],
-  worker: { format: 'es' },
+  plugins: [packed(), basisModule()],
+  worker: { format: 'es', plugins: () => [basisModule()] },
+  optimizeDeps: { exclude: ['three/examples/jsm/libs/basis/basis_transcoder.js'] },
   build: {
     outDir: process.env['RADIOSITY_WEB_OUT'] ?? 'dist',
     emptyOutDir: true,

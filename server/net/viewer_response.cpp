@@ -13,6 +13,12 @@ constexpr std::string_view kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; worker-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 
+/// The transcoder of KTX2 pictures makes its bindings from text, so that the worker that runs it, and nothing else,
+/// may.
+constexpr std::string_view kTranscoder = "/assets/transcode_worker";
+constexpr std::string_view kTranscoderPolicy =
+    "default-src 'none'; script-src 'self' 'unsafe-eval'; connect-src 'self'; base-uri 'none'";
+
 std::string_view trimmed(std::string_view text) {
   while (text.starts_with(' ') || text.starts_with('\t')) text.remove_prefix(1);
   while (text.ends_with(' ') || text.ends_with('\t')) text.remove_suffix(1);
@@ -61,7 +67,7 @@ HttpResponse viewerResponse(const HttpRequest& request) {
   response.headers.emplace_back("Vary", "Accept-Encoding");
   const bool forever = path.starts_with(kAssets);
   response.headers.emplace_back("Cache-Control", forever ? "public, max-age=31536000, immutable" : "no-cache");
-  response.headers.emplace_back("Content-Security-Policy", kPolicy);
+  response.headers.emplace_back("Content-Security-Policy", path.starts_with(kTranscoder) ? kTranscoderPolicy : kPolicy);
   response.headers.emplace_back("Referrer-Policy", "no-referrer");
   if (has(request.if_none_match, file->tag)) {
     response.status = 304;

@@ -62,7 +62,7 @@ void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
     hash.add(triangle.metallic), hash.add(triangle.specular);
     for (const auto& colour : triangle.colours) hash.add(glm::dvec3(colour)), hash.add(colour.w);
     hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff),
-        hash.add(triangle.transmission);
+        hash.add(triangle.transmission), hash.add(triangle.diffuse_transmission), hash.add(triangle.transmitted);
     const auto& mirror = triangle.mirror;
     hash.add(mirror.metallic), hash.add(mirror.colour), hash.add(mirror.interface), hash.add(mirror.roughness);
     hash.add(mirror.attenuation);

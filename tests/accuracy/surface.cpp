@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "tests/oracle/random.h"
+#include "tests/oracle/shading.h"
 #include "tests/oracle/surface_finder.h"
 
 namespace radiosity::accuracy {
@@ -81,6 +82,21 @@ struct Sums {
   }
 };
 
+/// As lightmaps show a translucent place: from its own light, and that of its other side.
+oracle::Irradiance shownThrough(const oracle::Shading& shading, const oracle::Triangle& triangle,
+                                const glm::dvec3& position, const oracle::Irradiance& own,
+                                const oracle::Irradiance& beyond) {
+  const auto [u, v] = oracle::Shading::weights(triangle, position);
+  const auto base = shading.baseReflectance(triangle, u, v);
+  const auto of_own = shading.reflectance(triangle, u, v) / base;
+  const auto of_beyond = shading.transmittance(triangle, u, v) / base;
+  auto shown = own;
+  shown.mean_lux = of_own * own.mean_lux + of_beyond * beyond.mean_lux;
+  const auto a = of_own * own.standard_error, b = of_beyond * beyond.standard_error;
+  shown.standard_error = glm::sqrt(a * a + b * b);
+  return shown;
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> makePoints(const oracle::TriangleScene& scene, std::size_t count, std::uint32_t samples,
@@ -89,19 +105,31 @@ std::vector<SurfacePoint> makePoints(const oracle::TriangleScene& scene, std::si
   double sum = 0.0;
   for (const auto& triangle : scene.triangles) cumulative.push_back(sum += oracle::area(triangle));
   oracle::Random random(seed);
-  std::vector<oracle::Footprint> footprints;
+  std::vector<oracle::Footprint> footprints, beyond;
+  std::vector<std::size_t> on;  // by point: its triangle
   for (std::size_t i = 0; i < count && sum > 0.0; ++i) {
     const double target = (static_cast<double>(i) + random.uniform()) / static_cast<double>(count) * sum;
     const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
     const auto& triangle = scene.triangles[static_cast<std::size_t>(found - cumulative.begin())];
-    footprints.push_back({{placeOn(triangle, triangle.double_sided && i % 2 == 1, random)}});
+    footprints.push_back({{placeOn(triangle, oracle::hasTwoSides(triangle) && i % 2 == 1, random)}});
+    on.push_back(static_cast<std::size_t>(&triangle - scene.triangles.data()));
+    beyond.emplace_back();
+    if (triangle.diffuse_transmission <= 0.0) continue;
+    beyond.back() = footprints.back();
+    auto& piece = beyond.back().pieces.front();
+    piece.normal = -piece.normal;
+    for (auto& corner : piece.shading) corner = -corner;
   }
-  const auto traced = oracle::PathTracer(scene).irradiance(
-      footprints, {.samples = samples, .seed = seed + 1, .leave_out_buried = false});
+  const oracle::PathTracer tracer(scene);
+  const auto traced = tracer.irradiance(footprints, {.samples = samples, .seed = seed + 1, .leave_out_buried = false});
+  const auto behind = tracer.irradiance(beyond, {.samples = samples, .seed = seed + 2, .leave_out_buried = false});
+  const oracle::Shading shading(scene);
   std::vector<SurfacePoint> points;
   for (std::size_t i = 0; i < footprints.size(); ++i) {
     const auto& piece = footprints[i].pieces.front();
     points.push_back({piece.corners[0], piece.normal, traced[i]});
+    if (!beyond[i].pieces.empty())
+      points.back().irradiance = shownThrough(shading, scene.triangles[on[i]], piece.corners[0], traced[i], behind[i]);
   }
   return points;
 }

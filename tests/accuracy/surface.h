@@ -19,6 +19,8 @@ namespace radiosity::accuracy {
 struct SurfacePoint {
   glm::dvec3 position{0.0};
   glm::dvec3 normal{0.0};  ///< unit, of the side that is seen; of the triangle, not of its shading
+  /// Of what transmits diffusely: what a surface of its base colour alone would need to look the same, as lightmaps
+  /// hold it.
   oracle::Irradiance irradiance;
 
   /// Nobody sees it: it lies inside a solid, whose backs end nearly all rays at once.

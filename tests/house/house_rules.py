@@ -100,7 +100,7 @@ VIEWER_IMPORTS = {
     "app": {"editing", "looking", "protocol", "scenes", "session", "tiles", "ui", "view", "view/light", "view/looks"},
     "editing": {"document", "protocol", "ui", "view", "view/controls"},
     "looking": {"document", "page", "protocol", "ui", "view", "view/controls", "view/looks", "view/rays", "view/scene"},
-    "scenes": {"document", "page", "protocol", "ui", "view", "view/light"},
+    "scenes": {"document", "page", "protocol", "textures", "ui", "view", "view/light"},
     "session": {"document", "page", "protocol", "ui", "view", "view/looks"},
     "ui": {"document", "page", "protocol", "view/looks"},
     "tiles": {"protocol", "view/light"},
@@ -114,6 +114,7 @@ VIEWER_IMPORTS = {
     "view/frames": set(),
     "view/looks": set(),
     "document": {"protocol"},
+    "textures": set(),
     "protocol": set(),
     "page": set(),
 }

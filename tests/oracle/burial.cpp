@@ -55,7 +55,7 @@ std::vector<Burial::Crossing> Burial::solidCrossings(const glm::dvec3& from, con
 /// Opaque, and lit on both sides: nobody sees beyond it.
 bool Burial::isSheet(const Crossing& crossing) const {
   const auto& triangle = triangles_[crossing.triangle];
-  return triangle.double_sided && !triangle.see_through;
+  return hasTwoSides(triangle) && !triangle.see_through;
 }
 
 bool Burial::isFront(std::uint32_t triangle, const glm::dvec3& direction) const {
@@ -141,7 +141,7 @@ bool Burial::underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std
     const bool before = shines != emits(other)         ? emits(other)
                         : through != other.see_through ? through
                                                        : crossing.triangle < triangle;
-    return before && (same > kSameFacing || (other.double_sided && same < -kSameFacing));
+    return before && (same > kSameFacing || (hasTwoSides(other) && same < -kSameFacing));
   });
 }
 

@@ -64,15 +64,20 @@ struct Vertices {
   std::vector<glm::dvec2> lightmap_uvs;
   std::vector<glm::dvec4> colours;
   std::vector<glm::dvec2> base_colour, emissive, metal, specular;  ///< of the textures
+  std::vector<glm::dvec2> transmission_part, transmission_colour;
 };
 
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file) {
     for (const auto& extension : file_.member("extensionsRequired")) {
-      static const std::vector<std::string> kKnown{"KHR_lights_punctual",   "EXT_lights_area",
-                                                   "KHR_texture_transform", "KHR_materials_emissive_strength",
-                                                   "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness"};
+      static const std::vector<std::string> kKnown{"KHR_lights_punctual",
+                                                   "EXT_lights_area",
+                                                   "KHR_texture_transform",
+                                                   "KHR_materials_emissive_strength",
+                                                   "KHR_mesh_quantization",
+                                                   "KHR_materials_pbrSpecularGlossiness",
+                                                   "KHR_materials_diffuse_transmission"};
       if (std::find(kKnown.begin(), kKnown.end(), extension.get<std::string>()) == kKnown.end())
         throw std::runtime_error("requires the extension " + extension.dump());
     }
@@ -212,6 +217,8 @@ class Reader {
     made.emissive = textureUvs(attributes, material.emissive, count);
     made.metal = textureUvs(attributes, material.metal, count);
     made.specular = textureUvs(attributes, material.specular_texture, count);
+    made.transmission_part = textureUvs(attributes, material.transmission_part, count);
+    made.transmission_colour = textureUvs(attributes, material.transmission_colour, count);
     made.colours = readColours(attributes, count);
     return made;
   }
@@ -277,6 +284,10 @@ class Reader {
     triangle.cutoff = values.cutoff;
     triangle.transmission = values.transmission;
     triangle.mirror = values.mirror;
+    triangle.diffuse_transmission = values.diffuse_transmission;
+    triangle.transmitted = values.transmitted;
+    triangle.transmission_part.texture = values.transmission_part.texture;
+    triangle.transmission_colour.texture = values.transmission_colour.texture;
     return triangle;
   }
 
@@ -291,6 +302,8 @@ class Reader {
       triangle.emissive.uv[k] = vertices.emissive.at(vertex);
       triangle.metal.uv[k] = vertices.metal.at(vertex);
       triangle.specular_texture.uv[k] = vertices.specular.at(vertex);
+      triangle.transmission_part.uv[k] = vertices.transmission_part.at(vertex);
+      triangle.transmission_colour.uv[k] = vertices.transmission_colour.at(vertex);
       triangle.colours[k] = vertices.colours.at(vertex);
     }
     const auto& [a, b, c] = triangle.corners;

@@ -42,6 +42,7 @@ class MaterialReader {
 
   MaterialValues read(const json& material) {
     MaterialValues values;
+    diffuse_part_ = 1.0;
     const auto pbr = material.value("pbrMetallicRoughness", json::object());
     const auto gloss = extensionOf(material, "KHR_materials_pbrSpecularGlossiness");
     // A file that has both means the first for those who do not know the second.
@@ -55,6 +56,7 @@ class MaterialReader {
     const auto& factor =
         gloss.is_object() ? gloss.value("diffuseFactor", json()) : pbr.value("baseColorFactor", json());
     readOpacity(material, factor, values);
+    readDiffuseTransmission(material, values);
     return values;
   }
 
@@ -68,7 +70,8 @@ class MaterialReader {
     values.mirror.colour = values.reflectance;
     values.mirror.roughness = pbr.value("roughnessFactor", 1.0);
     if (values.metal.texture >= 0) return;
-    values.reflectance *= 1.0 - values.metallic;
+    diffuse_part_ = 1.0 - values.metallic;
+    values.reflectance *= diffuse_part_;
     values.metallic = 0.0;
   }
 
@@ -79,8 +82,19 @@ class MaterialReader {
     values.specular_texture = textureUse(gloss, "specularGlossinessTexture");
     values.specular = gloss.contains("specularFactor") ? vector3(gloss["specularFactor"]) : glm::dvec3(1.0);
     if (values.specular_texture.texture >= 0) return;
-    values.reflectance *= 1.0 - std::max({values.specular.x, values.specular.y, values.specular.z});
+    diffuse_part_ = 1.0 - std::max({values.specular.x, values.specular.y, values.specular.z});
+    values.reflectance *= diffuse_part_;
     values.specular = glm::dvec3(0.0);
+  }
+
+  void readDiffuseTransmission(const json& material, MaterialValues& values) {
+    const auto extension = extensionOf(material, "KHR_materials_diffuse_transmission");
+    if (!extension.is_object()) return;
+    values.diffuse_transmission = extension.value("diffuseTransmissionFactor", 0.0);
+    const char* colour = "diffuseTransmissionColorFactor";
+    values.transmitted = diffuse_part_ * (extension.contains(colour) ? vector3(extension[colour]) : glm::dvec3(1.0));
+    values.transmission_part = textureUse(extension, "diffuseTransmissionTexture");
+    values.transmission_colour = textureUse(extension, "diffuseTransmissionColorTexture");
   }
 
   void readEmission(const json& material, MaterialValues& values) {
@@ -127,6 +141,7 @@ class MaterialReader {
 
   const GltfFile& file_;
   std::vector<std::string>& warnings_;
+  double diffuse_part_ = 1.0;  ///< that metal and gloss leave of the material's light where no texture tells
 };
 
 Image decode(std::span<const char> bytes) {

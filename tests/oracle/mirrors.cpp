@@ -77,4 +77,27 @@ glm::dvec3 reflect(const glm::dvec3& normal, const glm::dvec3& direction, const 
   return drawn.direction;
 }
 
+std::optional<glm::dvec3> Mirrors::goOn(const Shading& shading, const Triangle& triangle, const Place& place,
+                                        const glm::dvec3& direction, glm::dvec3& part, Random& random) const {
+  const auto [u, v] = Shading::weights(triangle, place.position);
+  const auto facing = shading.mirror(triangle, u, v);
+  if (!facing.any() && triangle.transmission <= 0.0) return std::nullopt;
+  // The back of one side passes light; it reflects where that is all the front does.
+  const double lit = place.is_back && !hasTwoSides(triangle) && triangle.transmission < 0.999 ? 0.0 : 1.0;
+  const auto usual = facing.at(-glm::dot(direction, place.normal));
+  const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
+  if (random.uniform() < chance) {
+    part *= lit / chance;
+    return reflect(place.normal, direction, facing, rough_.at(triangle.mirror.roughness), part, random);
+  }
+  part /= 1.0 - chance;
+  if (triangle.transmission <= 0.0) return std::nullopt;
+  if (random.uniform() >= triangle.transmission * (1.0 - triangle.mirror.metallic)) {
+    part *= lit / (1.0 - triangle.transmission);  // which the reflectance has
+    return std::nullopt;
+  }
+  part *= shading.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
+  return direction;
+}
+
 }  // namespace radiosity::oracle

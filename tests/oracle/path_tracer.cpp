@@ -86,7 +86,7 @@ class PathTracer::Scene {
       see_through_ = see_through_ || triangle.see_through;
       if (!(triangle.mirror.metallic > 0.0 || triangle.transmission > 0.0)) continue;
       has_mirrors_ = true;
-      rough_mirrors_.try_emplace(triangle.mirror.roughness, triangle.mirror.roughness);
+      mirrors_.add(triangle.mirror.roughness);
     }
     gatherLights();
   }
@@ -210,6 +210,15 @@ class PathTracer::Scene {
     return shading_.reflectance(triangle, u, v);
   }
 
+  /// Of what leaves there the part that each bit of light contributes that arrives on the side where the path goes on.
+  [[nodiscard]] glm::dvec3 scatteredAt(const Triangle& triangle, Point& at, Random& random) const {
+    if (!(triangle.diffuse_transmission > 0.0)) return reflectanceAt(triangle, at.position);
+    const auto [u, v] = Shading::weights(triangle, at.position);
+    const auto [part, is_other_side] = shading_.scatter(triangle, u, v, random.uniform());
+    if (is_other_side) at.normal = -at.normal, at.shading = -at.shading;
+    return part;
+  }
+
   /// Whether the point lies where its own surface is cut out.
   [[nodiscard]] bool onHole(const Point& point) const {
     const Point above{point.position + point.normal * (4.0 * kLift / rays_.scale()), -point.normal};
@@ -262,7 +271,7 @@ class PathTracer::Scene {
     const auto direction = way / std::sqrt(distance2);
     const double cos_at = glm::dot(direction, at.normal) > 0.0 ? glm::dot(direction, at.shading) : 0.0;
     double cos_light = -glm::dot(direction, light.normal);
-    if (cos_light < 0.0 && light.double_sided) {
+    if (cos_light < 0.0 && hasTwoSides(light)) {
       cos_light = -cos_light;
       y.normal = -y.normal;
     }
@@ -314,14 +323,14 @@ class PathTracer::Scene {
         sum += sent * alongMirrors(direction, hit, throughput, random);
         if (!hit) return sum;
       }
-      throughput *= reflectanceAt(triangles()[hit->triangle], hit->point.position);
+      at = hit->point;
+      throughput *= scatteredAt(triangles()[hit->triangle], at, random);
       const double survival = std::min(1.0, std::max({throughput.x, throughput.y, throughput.z}));
       if (survival <= 0.0) return sum;
       if (bounce >= 1) {
         if (random.uniform() >= survival) return sum;
         throughput /= survival;
       }
-      at = hit->point;
     }
   }
 
@@ -333,7 +342,9 @@ class PathTracer::Scene {
     constexpr int kMostHops = 64;
     glm::dvec3 part(1.0), sum(0.0);
     for (int hop = 0; hop < kMostHops; ++hop) {
-      auto way = goOn(*hit, direction, part, random);
+      const auto& triangle = triangles()[hit->triangle];
+      const Mirrors::Place place{hit->point.position, hit->point.normal, hit->back};
+      auto way = mirrors_.goOn(shading_, triangle, place, direction, part, random);
       if (!way) {
         throughput *= part;
         return sum;
@@ -354,33 +365,9 @@ class PathTracer::Scene {
     return sum;
   }
 
-  /// Where it goes from a mirror, or through glass; none: it is scattered. By chance, which `part` makes up for.
-  [[nodiscard]] std::optional<glm::dvec3> goOn(const Hit& hit, const glm::dvec3& direction, glm::dvec3& part,
-                                               Random& random) const {
-    const auto& triangle = triangles()[hit.triangle];
-    const auto [u, v] = Shading::weights(triangle, hit.point.position);
-    const auto facing = shading_.mirror(triangle, u, v);
-    if (!facing.any() && triangle.transmission <= 0.0) return std::nullopt;
-    // The back of one side passes light; it reflects where that is all the front does.
-    const double lit = hit.back && !triangle.double_sided && triangle.transmission < 0.999 ? 0.0 : 1.0;
-    const auto usual = facing.at(-glm::dot(direction, hit.point.normal));
-    const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
-    if (random.uniform() < chance) {
-      part *= lit / chance;
-      return reflect(hit.point.normal, direction, facing, rough_mirrors_.at(triangle.mirror.roughness), part, random);
-    }
-    part /= 1.0 - chance;
-    if (triangle.transmission <= 0.0) return std::nullopt;
-    if (random.uniform() >= triangle.transmission * (1.0 - triangle.mirror.metallic)) {
-      part *= lit / (1.0 - triangle.transmission);  // which the reflectance has
-      return std::nullopt;
-    }
-    part *= shading_.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
-    return direction;
-  }
-
   [[nodiscard]] bool isBlackBack(const Hit& hit) const {
-    return hit.back && !triangles()[hit.triangle].double_sided && triangles()[hit.triangle].transmission <= 0.0;
+    const auto& triangle = triangles()[hit.triangle];
+    return hit.back && !hasTwoSides(triangle) && triangle.transmission <= 0.0;
   }
 
   void count(const std::optional<Hit>& first, Tally& tally) const {
@@ -467,7 +454,7 @@ class PathTracer::Scene {
   glm::dvec3 sky_upper_, sky_lower_;
   SkyMap sky_map_;
   bool see_through_ = false, has_mirrors_ = false;  // anything
-  std::map<double, RoughMirror> rough_mirrors_;     // by roughness
+  Mirrors mirrors_;
   std::vector<std::size_t> lights_;
   std::vector<double> cumulative_power_;
   std::vector<double> light_density_;  // by triangle; 0: does not shine

@@ -30,18 +30,52 @@ glm::dvec4 Shading::colour(const TextureUse& use, double u, double v) const {
 }
 
 glm::dvec3 Shading::reflectance(const Triangle& triangle, double u, double v) const {
+  const double part = transmittedPart(triangle, u, v);
+  return part > 0.0 ? baseReflectance(triangle, u, v) * (1.0 - part) : baseReflectance(triangle, u, v);
+}
+
+glm::dvec3 Shading::baseReflectance(const Triangle& triangle, double u, double v) const {
   auto result = triangle.reflectance * glm::dvec3(colour(triangle.base_colour, u, v));
   if (triangle.coloured) result *= glm::dvec3(between(triangle.colours, u, v));
+  result *= diffusePart(triangle, u, v);
+  return glm::clamp(result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+}
+
+glm::dvec3 Shading::transmittance(const Triangle& triangle, double u, double v) const {
+  if (!(triangle.diffuse_transmission > 0.0)) return glm::dvec3(0.0);
+  const auto result = triangle.transmitted * glm::dvec3(colour(triangle.transmission_colour, u, v)) *
+                      (diffusePart(triangle, u, v) * transmittedPart(triangle, u, v));
+  return glm::clamp(result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+}
+
+Shading::Scattered Shading::scatter(const Triangle& triangle, double u, double v, double chance) const {
+  const auto reflected = reflectance(triangle, u, v), transmitted = transmittance(triangle, u, v);
+  const double both = reflected.x + reflected.y + reflected.z + transmitted.x + transmitted.y + transmitted.z;
+  if (!(both > 0.0)) return {};
+  const double through = (transmitted.x + transmitted.y + transmitted.z) / both;
+  if (chance >= through) return {reflected / (1.0 - through), false};
+  return {transmitted / through, true};
+}
+
+/// What glass, and metal and gloss where textures tell of them, leave.
+double Shading::diffusePart(const Triangle& triangle, double u, double v) const {
+  double part = 1.0 - triangle.transmission;
   if (triangle.metallic > 0.0) {
     const auto* texture = textureOf(triangle.metal);
     const double blue = texture == nullptr ? 1.0 : texture->value(between(triangle.metal.uv, u, v)).z;
-    result *= 1.0 - triangle.metallic * blue;
+    part *= 1.0 - triangle.metallic * blue;
   }
   if (triangle.specular != glm::dvec3(0.0)) {
     const auto specular = triangle.specular * glm::dvec3(colour(triangle.specular_texture, u, v));
-    result *= 1.0 - std::max({specular.x, specular.y, specular.z});
+    part *= 1.0 - std::max({specular.x, specular.y, specular.z});
   }
-  return glm::clamp((1.0 - triangle.transmission) * result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+  return part;
+}
+
+double Shading::transmittedPart(const Triangle& triangle, double u, double v) const {
+  return triangle.diffuse_transmission > 0.0
+             ? triangle.diffuse_transmission * colour(triangle.transmission_part, u, v).w
+             : 0.0;
 }
 
 glm::dvec3 Shading::Facing::at(double cosine) const {

@@ -24,6 +24,17 @@ class Shading {
   [[nodiscard]] static std::pair<double, double> weights(const Triangle& triangle, const glm::dvec3& position);
 
   [[nodiscard]] glm::dvec3 reflectance(const Triangle& triangle, double u, double v) const;
+  /// The same as if nothing were transmitted diffusely: by what an engine that does not know of that multiplies light.
+  [[nodiscard]] glm::dvec3 baseReflectance(const Triangle& triangle, double u, double v) const;
+  /// Of light on the other side, what leaves diffusely on this one.
+  [[nodiscard]] glm::dvec3 transmittance(const Triangle& triangle, double u, double v) const;
+  /// Where a path goes on, `chance` being uniform in [0, 1): on the other side or not, and of what leaves there, what
+  /// the light contributes that arrives.
+  struct Scattered {
+    glm::dvec3 part{0.0};
+    bool is_other_side = false;
+  };
+  [[nodiscard]] Scattered scatter(const Triangle& triangle, double u, double v, double chance) const;
   [[nodiscard]] glm::dvec3 emission(const Triangle& triangle, double u, double v) const;  ///< lux
   /// What it reflects as a mirror, of light straight at it and of light along it.
   struct Facing {
@@ -46,6 +57,8 @@ class Shading {
     return use.texture < 0 ? nullptr : &textures_[static_cast<std::size_t>(use.texture)];
   }
   [[nodiscard]] glm::dvec4 colour(const TextureUse& use, double u, double v) const;
+  [[nodiscard]] double diffusePart(const Triangle& triangle, double u, double v) const;
+  [[nodiscard]] double transmittedPart(const Triangle& triangle, double u, double v) const;
 
   std::vector<Triangle> triangles_;
   std::vector<Texture> textures_;

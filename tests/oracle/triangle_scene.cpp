@@ -30,6 +30,8 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
         const auto& [a, b, c] = triangle.corners;
         triangle.normal = glm::normalize(glm::cross(b - a, c - a));
         triangle.reflectance = material.reflectance;
+        triangle.diffuse_transmission = material.diffuse_transmission;
+        triangle.transmitted = material.transmitted;
         triangle.emission_lux = std::numbers::pi * material.emission_nits;
         triangle.alpha = material.opacity;
         triangle.see_through = material.opacity < 1.0;
@@ -93,7 +95,9 @@ bool sameMaterial(const Triangle& a, const Triangle& b) {
          a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
          a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission &&
          a.mirror.metallic == b.mirror.metallic && a.mirror.interface == b.mirror.interface &&
-         a.mirror.roughness == b.mirror.roughness;
+         a.mirror.roughness == b.mirror.roughness && a.diffuse_transmission == b.diffuse_transmission &&
+         a.transmitted == b.transmitted && a.transmission_part.texture == b.transmission_part.texture &&
+         a.transmission_colour.texture == b.transmission_colour.texture;
 }
 
 }  // namespace

@@ -68,6 +68,12 @@ struct Triangle {
   double cutoff = -1.0;  ///< alpha mask; below 0: blended
   double transmission = 0.0;
   Mirror mirror;
+  /// KHR_materials_diffuse_transmission: of the light that is not reflected specularly, and its colour. Above 0 light
+  /// arrives at, and leaves from, both sides, whatever `double_sided` says.
+  double diffuse_transmission = 0.0;
+  glm::dvec3 transmitted{0.0};   ///< what textures multiply, the metal's loss included as in `reflectance`
+  TextureUse transmission_part;  ///< its alpha multiplies diffuse_transmission
+  TextureUse transmission_colour;
   std::uint32_t node = 0, material = 0;
 };
 
@@ -85,6 +91,10 @@ struct TriangleScene {
 [[nodiscard]] double area(const Triangle& triangle);
 /// Mirror::interface of a refractive index.
 [[nodiscard]] double interfaceOf(double ior);
+
+[[nodiscard]] inline bool hasTwoSides(const Triangle& triangle) {
+  return triangle.double_sided || triangle.diffuse_transmission > 0.0;
+}
 
 [[nodiscard]] TriangleScene triangulate(const test_scenes::TestScene& scene);
 

@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -116,6 +117,10 @@ json materialJson(const Material& material) {
   if (material.double_sided) result["doubleSided"] = true;
   if (material.transmission > 0.0)
     result["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", material.transmission}};
+  if (material.diffuse_transmission > 0.0)
+    result["extensions"]["KHR_materials_diffuse_transmission"] = {
+        {"diffuseTransmissionFactor", material.diffuse_transmission},
+        {"diffuseTransmissionColorFactor", toJson(material.transmitted)}};
   const auto& emission = material.emission_nits;
   const double strength = std::max({emission.x, emission.y, emission.z});
   if (strength <= 0.0) return result;
@@ -194,12 +199,13 @@ json document(const TestScene& scene, Writer& writer) {
             {"meshes", json::array()},
             {"materials", json::array()},
             {"cameras", json::array({cameraJson(scene.camera)})}};
+  std::set<std::string> used;
   for (const auto& material : scene.materials) {
     gltf["materials"].push_back(materialJson(material));
-    if (gltf["materials"].back().contains("extensions")) {
-      gltf["extensionsUsed"] = json::array({"KHR_materials_emissive_strength"});
-    }
+    const auto extensions = gltf["materials"].back().value("extensions", json::object());
+    for (const auto& [extension, value] : extensions.items()) used.insert(extension);
   }
+  if (!used.empty()) gltf["extensionsUsed"] = used;
   for (const auto& object : scene.objects) {
     json primitives = json::array();
     for (std::uint32_t m = 0; m < scene.materials.size(); ++m) {

@@ -16,7 +16,9 @@ struct Material {
   double opacity = 1.0;           ///< below 1: alphaMode BLEND
   bool double_sided = false;
   double metallic = 0.0, roughness = 1.0;
-  double transmission = 0.0;  ///< above 0: glass, of which `reflectance` is the tint
+  double transmission = 0.0;          ///< above 0: glass, of which `reflectance` is the tint
+  double diffuse_transmission = 0.0;  ///< KHR_materials_diffuse_transmission: its factor, and its colour
+  glm::dvec3 transmitted{1.0};
 };
 
 /// Convex, planar, counter-clockwise seen from the side that reflects and emits.

@@ -2,6 +2,8 @@
 
 #include <glm/common.hpp>
 
+#include "server/scene/lightmap/translucent_texels.h"
+
 namespace radiosity::engine {
 
 scene::LeafLight leafLight(const solver::Solver& solver, const SolveSettings& settings) {
@@ -12,6 +14,13 @@ scene::LeafLight leafLight(const solver::Solver& solver, const SolveSettings& se
   light.difference = solver.halfIrradiance(0);
   const auto second = solver.halfIrradiance(1);
   for (std::size_t n = 0; n < second.size(); ++n) light.difference[n] -= second[n];
+  return light;
+}
+
+scene::LeafLight showThrough(scene::LeafLight light, const scene::PatchScene& patches,
+                             const scene::PatchMaterials& materials) {
+  scene::joinTranslucentSides(patches, materials, light.mean);
+  scene::joinTranslucentSides(patches, materials, light.difference);
   return light;
 }
 

@@ -11,4 +11,8 @@ namespace radiosity::engine {
 /// passes over the leaves.
 [[nodiscard]] scene::LeafLight leafLight(const solver::Solver& solver, const SolveSettings& settings);
 
+/// As lightmaps are to hold it: of translucent surfaces with what glows through (translucent_texels.h).
+[[nodiscard]] scene::LeafLight showThrough(scene::LeafLight light, const scene::PatchScene& patches,
+                                           const scene::PatchMaterials& materials);
+
 }  // namespace radiosity::engine

@@ -8,7 +8,6 @@
 #include "common/give_back.h"
 #include "common/task.h"
 #include "server/engine/lit/carried_light.h"
-#include "server/engine/lit/leaf_light.h"
 #include "server/scene/burial/burial_record.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/shading/emitters.h"
@@ -313,8 +312,8 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
   // Only of links that are taken over is the lights' part known before all else.
   const bool known = former_map_ && !former_map_->nothingKept();
   if (before.showsOwnLight()) {
-    former_light_.emplace(FormerLight{before.scene_, before.patches_, same_layout, before.ownLight(), {}, false});
-    if (known) former_light_->direct = before.solver_->directIrradiance();
+    former_light_.emplace(FormerLight{before.scene_, before.patches_, same_layout, before.shownLight(), {}, false});
+    if (known) former_light_->direct = before.directLight();
     return;
   }
   const auto carried = [&](std::vector<scene::LightmapPage> pages) {
@@ -359,7 +358,7 @@ void LitScene::forgetOldDirect() {
 
 /// Empty: not known.
 std::vector<scene::LightmapPage> LitScene::directPages() const {
-  const auto direct = solver_->directIrradiance();
+  const auto direct = directLight();
   if (direct.empty()) return {};
   return scene::assemblePages(*patches_, direct);
 }
@@ -394,7 +393,7 @@ void LitScene::updateSolver(bool materials, bool lights) {
   }
   std::vector<glm::vec3> direct;
   if ((lights || power_ != power_before) && !solver_->isRepairing() && solver_->linkCounters().bytes >= slow_links_)
-    direct = solver_->directIrradiance();
+    direct = directLight();
   if (materials) solver_->setMaterials(materials_);
   if (lights) solver_->setLights(sources_);
   if (!direct.empty()) showLightsFirst(direct);
@@ -402,10 +401,10 @@ void LitScene::updateSolver(bool materials, bool lights) {
 
 /// Until the solver has the light over all its links.
 void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
-  const auto direct = solver_->directIrradiance();
+  const auto direct = directLight();
   if (direct.empty()) return;
   if (showsOwnLight()) {
-    auto light = ownLight();
+    auto light = shownLight();
     for (std::size_t n = 0; n < light.mean.size(); ++n)
       light.mean[n] = glm::max(light.mean[n] + direct[n] - direct_before[n], 0.0F);
     old_light_ = scene::assemblePages(*patches_, scene::fitTexels(*patches_, light));
@@ -465,7 +464,7 @@ void LitScene::probeSurface(double seconds, bool is_late) {
 }
 
 std::vector<scene::LightmapPage> LitScene::pages() const {
-  return scene::assemblePages(*patches_, scene::fitTexels(*patches_, ownLight()));
+  return scene::assemblePages(*patches_, scene::fitTexels(*patches_, shownLight()));
 }
 
 /// What is shown of a fade as long as nothing new is known.

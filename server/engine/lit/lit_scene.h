@@ -12,6 +12,7 @@
 
 #include "common/result.h"
 #include "server/engine/engine.h"
+#include "server/engine/lit/leaf_light.h"
 #include "server/engine/lit/light_report.h"
 #include "server/engine/lit/scene_change.h"
 #include "server/engine/lit/surface_probe.h"
@@ -166,6 +167,8 @@ class LitScene {
 
   /// The solver's present irradiance by node, lux, nowhere below 0.
   [[nodiscard]] scene::LeafLight ownLight() const;
+  /// The same as lightmaps are to hold it: of translucent surfaces with what glows through (translucent_texels.h).
+  [[nodiscard]] scene::LeafLight shownLight() const { return showThrough(ownLight(), *patches_, materials_); }
   /// Finished pages of it (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
@@ -264,6 +267,10 @@ class LitScene {
   void forgetOldDirect();
   void showLightsFirst(const std::vector<glm::vec3>& direct_before);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
+  /// Of shownLight() the part that comes straight from lights; empty: not known.
+  [[nodiscard]] std::vector<glm::vec3> directLight() const {
+    return showThrough({solver_->directIrradiance()}, *patches_, materials_).mean;
+  }
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;
   [[nodiscard]] double emittedPower() const;

@@ -30,7 +30,7 @@ bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse us
 
 /// Which sides a surface has, and where one can see through it.
 bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material& n) {
-  if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode ||
+  if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode || m.isTranslucent() != n.isTranslucent() ||
       scene::passedPart(m) != scene::passedPart(n) || scene::isSeeThrough(m) != scene::isSeeThrough(n) ||
       scene::glassFace(m) != scene::glassFace(n))
     return false;
@@ -45,10 +45,18 @@ bool sameGloss(const Scene& a, const Material& m, const Scene& b, const Material
   return m.roughness == n.roughness && m.ior == n.ior && sameTexture(a, m.roughness_texture, b, n.roughness_texture);
 }
 
+/// Of what passes on light diffusely.
+bool samePassing(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  return m.diffuse_transmission == n.diffuse_transmission &&
+         m.diffuse_transmission_color == n.diffuse_transmission_color &&
+         sameTexture(a, m.diffuse_transmission_texture, b, n.diffuse_transmission_texture) &&
+         sameTexture(a, m.diffuse_transmission_color_texture, b, n.diffuse_transmission_color_texture);
+}
+
 bool sameShading(const Scene& a, const Material& m, const Scene& b, const Material& n) {
   return m.base_color == n.base_color && m.transmission == n.transmission && m.attenuation == n.attenuation &&
          m.metallic == n.metallic && m.specular == n.specular && sameGloss(a, m, b, n) && m.emission == n.emission &&
-         sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+         samePassing(a, m, b, n) && sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
          sameTexture(a, m.metallic_texture, b, n.metallic_texture) &&
          sameTexture(a, m.specular_texture, b, n.specular_texture) &&
          sameTexture(a, m.emissive_texture, b, n.emissive_texture);

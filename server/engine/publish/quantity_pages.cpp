@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <utility>
 
+#include "server/scene/lightmap/translucent_texels.h"
 #include "server/solver/error/texel_error.h"
 
 namespace radiosity::engine {
@@ -26,16 +27,37 @@ QuantityValues radiosity(const LitScene& lit) {
         values.nodes[first + leaf] = emission[leaf];
         values.reflectance[first + leaf] = reflectance[leaf];
       }
+      if (lit.materials().transmittance.sideCount() > 0) {
+        const auto transmittance = lit.materials().transmittance.side(side);
+        values.transmittance.resize(values.nodes.size());
+        for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
+          values.transmittance[first + leaf] = transmittance[leaf];
+      }
       ++side;
     }
   }
   return values;
 }
 
+/// What translucent surfaces let through. `transmittance`: by node; empty: there are none.
+void addPassed(const scene::PatchScene& patches, const std::vector<glm::vec3>& transmittance,
+               const std::vector<glm::vec3>& irradiance, std::vector<glm::vec3>& radiosity) {
+  for (const auto& surface : patches.surfaces) {
+    const auto [front, back] = surface.first_node;
+    if (transmittance.empty() || front == scene::kNone || back == scene::kNone) continue;
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      radiosity[front + leaf] += transmittance[front + leaf] * irradiance[back + leaf];
+      radiosity[back + leaf] += transmittance[back + leaf] * irradiance[front + leaf];
+    }
+  }
+}
+
 std::vector<glm::vec3> errorSquared(const LitScene& lit) {
   const auto& solver = lit.solver();
-  return solver::texelErrorSquared(lit.patches(), solver.halfIrradiance(0), solver.halfIrradiance(1),
-                                   solver.irradiance(), solver.error(), solver.commonErrorSquared());
+  auto squares = solver::texelErrorSquared(lit.patches(), solver.halfIrradiance(0), solver.halfIrradiance(1),
+                                           solver.irradiance(), solver.error(), solver.commonErrorSquared());
+  scene::joinTranslucentSides(lit.patches(), lit.materials(), squares, scene::SidesOf::kSquares);
+  return squares;
 }
 
 /// Of each side, away from the surface.
@@ -91,7 +113,7 @@ std::vector<IdImage> idPages(const LitScene& lit, Quantity quantity) {
 QuantityValues readQuantity(const LitScene& lit, Quantity quantity) {
   switch (quantity) {
     case Quantity::kIrradiance:
-      return {quantity, {}, {}, false, lit.ownLight(), {}};
+      return {quantity, {}, {}, false, lit.shownLight(), {}};
     case Quantity::kRadiosity:
       return radiosity(lit);
     case Quantity::kError:
@@ -114,6 +136,7 @@ QuantityPages assemble(const scene::PatchScene& patches, QuantityValues values) 
   if (values.quantity == Quantity::kRadiosity) {
     const auto irradiance = fitTexels(patches, values.light);
     for (std::size_t n = 0; n < irradiance.size(); ++n) values.nodes[n] += values.reflectance[n] * irradiance[n];
+    addPassed(patches, values.transmittance, irradiance, values.nodes);
   }
   if (!holdsIds(values.quantity)) pages.values = assemblePages(patches, values.nodes, seams);
   return pages;

@@ -27,7 +27,8 @@ struct QuantityValues {
   std::vector<IdImage> ids;     ///< finished pages of those
   bool squared = false;         ///< as QuantityPages::squared
   scene::LeafLight light = {};  ///< of irradiance and radiosity: to be fitted to texels, away from the solve thread
-  std::vector<glm::vec3> reflectance = {};  ///< of radiosity, by node
+  std::vector<glm::vec3> reflectance = {};    ///< of radiosity, by node
+  std::vector<glm::vec3> transmittance = {};  ///< likewise; empty: nothing is translucent
 };
 
 /// Costs a pass over all leaves.

@@ -18,7 +18,8 @@ std::uint64_t blackSides(const LitScene& lit) {
     for (const auto first : surface.first_node) {
       if (first == scene::kNone) continue;
       const auto& materials = lit.materials();
-      const glm::vec3 sum = materials.emission[first + root] + materials.reflectance[first + root];
+      glm::vec3 sum = materials.emission[first + root] + materials.reflectance[first + root];
+      if (materials.transmittance.sideCount() > 0) sum += materials.transmittance[first + root];
       black += sum == glm::vec3(0.0F) ? 1 : 0;
     }
   }

@@ -32,7 +32,7 @@ SideScene sideSceneOf(const SidedCharts& of) {
       sides.emits.push_back(emitters.shines(chart.instance, of.flat.triangles[t].source));
     }
     sides.groups.push_back({first, static_cast<std::uint32_t>(chart.triangles.size()), chart.instance,
-                            material.double_sided, isSeeThrough(material), chart.area / (of.texel * of.texel)});
+                            material.double_sided, passesLight(material), chart.area / (of.texel * of.texel)});
   }
   return sides;
 }
@@ -99,6 +99,8 @@ void litSides(const SidedCharts& of, const FormerScene* before, const std::vecto
       back = shines ? std::max(back, back_before) : back_before;
       turn = back > front || (back == front && former[c]->flipped);
     }
+    // What lights one of its sides shines from both.
+    if (materialOf(of.scene, chart).isTranslucent()) front = back = SideLight::kLit;
     if (turn) {
       flip(of.flat, chart);
       std::swap(front, back);

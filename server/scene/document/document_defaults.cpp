@@ -18,6 +18,7 @@ constexpr const char* kAreaLights = "EXT_lights_area";
 constexpr const char* kIesLights = "EXT_lights_ies";
 constexpr const char* kVisibility = "KHR_node_visibility";
 constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* kDiffuseTransmission = "KHR_materials_diffuse_transmission";
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
 
 void setDefault(Json& object, const char* member, Json value) {
@@ -126,6 +127,10 @@ bool materialiseMaterial(Json& material) {
     setDefault(*found, "diffuseFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
     setDefault(*found, "specularFactor", Json::array({1.0, 1.0, 1.0}));
     setDefault(*found, "glossinessFactor", 1.0);
+  }
+  if (const auto found = extensions.find(kDiffuseTransmission); found != extensions.end() && found->is_object()) {
+    setDefault(*found, "diffuseTransmissionFactor", 0.0);
+    setDefault(*found, "diffuseTransmissionColorFactor", Json::array({1.0, 1.0, 1.0}));
   }
   return true;
 }

@@ -229,6 +229,11 @@ std::uint64_t mostInflated(const ImageSize& size, bool deep) {
   return 2 * size.height * (kChannels * (deep ? 2 : 1) * size.width + 1) + kSpare;
 }
 
+bool isKtx2(const Bytes& bytes) {
+  constexpr std::array<std::uint8_t, 7> kMagic = {0xAB, 'K', 'T', 'X', ' ', '2', '0'};
+  return bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
+}
+
 }  // namespace
 
 std::string sniffImageType(const Bytes& bytes) {
@@ -245,7 +250,13 @@ std::string sniffImageType(const Bytes& bytes) {
 
 Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where) {
   // stb_image knows more formats, but glTF does not, and they are the less tested ones.
-  if (sniffImageType(bytes).empty()) return fail(ErrorCode::kUnsupported, "is neither PNG nor JPEG nor WebP", where);
+  if (sniffImageType(bytes).empty()) {
+    const char* what = isKtx2(bytes)
+                           ? "is KTX2, which the server does not decode; 'radiosity' and the viewer turn it into "
+                             "PNG where KHR_texture_basisu names it"
+                           : "is neither PNG nor JPEG nor WebP";
+    return fail(ErrorCode::kUnsupported, what, where);
+  }
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return fail(ErrorCode::kTooLarge, "image file has more than 2 GiB", where);
   }

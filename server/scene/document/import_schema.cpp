@@ -204,6 +204,10 @@ constexpr Member kTransmission[] = {number("transmissionFactor", -kSlack, 1 + kS
 constexpr Member kIor[] = {number("ior")};
 constexpr Member kVolume[] = {number("thicknessFactor"), object("thicknessTexture", kTextureInfo),
                               number("attenuationDistance"), numbers("attenuationColor", 3, -kSlack, 1 + kSlack)};
+constexpr Member kDiffuseTransmission[] = {number("diffuseTransmissionFactor", -kSlack, 1 + kSlack),
+                                           object("diffuseTransmissionTexture", kTextureInfo),
+                                           numbers("diffuseTransmissionColorFactor", 3, -kSlack, 1 + kSlack),
+                                           object("diffuseTransmissionColorTexture", kTextureInfo)};
 constexpr Member kSpecularGlossiness[] = {
     numbers("diffuseFactor", 4, -kSlack, 1 + kSlack), object("diffuseTexture", kTextureInfo),
     numbers("specularFactor", 3, -kSlack, 1 + kSlack), number("glossinessFactor", -kSlack, 1 + kSlack),
@@ -212,6 +216,7 @@ constexpr Member kNoMembers[] = {string("name")};
 constexpr Member kMaterialExtensions[] = {object("KHR_materials_emissive_strength", kEmissiveStrength),
                                           object("KHR_materials_ior", kIor),
                                           object("KHR_materials_transmission", kTransmission),
+                                          object("KHR_materials_diffuse_transmission", kDiffuseTransmission),
                                           object("KHR_materials_volume", kVolume),
                                           object("KHR_materials_pbrSpecularGlossiness", kSpecularGlossiness),
                                           object("KHR_materials_unlit", kNoMembers)};

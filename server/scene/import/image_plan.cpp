@@ -27,8 +27,13 @@ constexpr std::uint64_t kMostOfTwo = std::uint64_t{1} << 24;
 constexpr std::uint64_t kShadedThirds = 28, kDecodedThirds = 3 * kDecodedBytes;
 
 /// Textures that light needs.
-constexpr std::array<std::string_view, 5> kUsed = {"baseColorTexture", "emissiveTexture", "metallicRoughnessTexture",
-                                                   "diffuseTexture", "specularGlossinessTexture"};
+constexpr std::array<std::string_view, 7> kUsed = {"baseColorTexture",
+                                                   "emissiveTexture",
+                                                   "metallicRoughnessTexture",
+                                                   "diffuseTexture",
+                                                   "specularGlossinessTexture",
+                                                   "diffuseTransmissionTexture",
+                                                   "diffuseTransmissionColorTexture"};
 
 /// An index of that many things; `count` where it is none.
 std::size_t indexOf(const Json& value, std::size_t count) {

@@ -23,6 +23,7 @@ constexpr int kClamp = 33071;
 constexpr int kMirror = 33648;
 constexpr int kNearest = 9728;
 constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* kDiffuseTransmission = "KHR_materials_diffuse_transmission";
 
 float unit(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
 
@@ -46,6 +47,7 @@ class MaterialImporter {
     const auto* specular = extensionOf(json, kSpecularGlossiness);
     if (auto ok = specular != nullptr ? readSpecular(*specular, json, out) : readMetallic(source, json, out); !ok)
       return ok;
+    if (auto ok = readTranslucent(json, out); !ok) return ok;
     readOthers(json, out);
     context_.scene.materials.push_back(std::move(out));
     return {};
@@ -160,6 +162,36 @@ class MaterialImporter {
       left[c] = std::pow(colour, static_cast<float>(std::max(thickness, 0.0) / distance));
     }
     return left;
+  }
+
+  Result<void> readTranslucent(const Json& json, Material& out) {
+    const auto* extension = extensionOf(json, kDiffuseTransmission);
+    if (extension == nullptr) return {};
+    out.diffuse_transmission = unit(extension->value("diffuseTransmissionFactor", 0.0));
+    if (!out.isTranslucent()) return {};  // its colour and textures change nothing
+    if (const auto colour = extension->find("diffuseTransmissionColorFactor"); colour != extension->end())
+      for (std::size_t c = 0; c < 3; ++c)
+        out.diffuse_transmission_color[static_cast<int>(c)] = unit((*colour)[c].get<double>());
+    const std::string prefix = std::string("/extensions/") + kDiffuseTransmission;
+    // Alpha is not coded, whatever the colours are.
+    if (auto ok =
+            readTexture(json, prefix + "/diffuseTransmissionTexture", Coding::kSrgb, out.diffuse_transmission_texture);
+        !ok)
+      return ok;
+    if (auto ok = readTexture(json, prefix + "/diffuseTransmissionColorTexture", Coding::kSrgb,
+                              out.diffuse_transmission_color_texture);
+        !ok)
+      return ok;
+    if (!out.double_sided && out.emission != glm::vec3(0.0F))
+      context_.warn(pointer_,
+                    "'" + out.name + "' transmits light diffusely, so that it has two sides, and emits from both");
+    out.double_sided = true;
+    const auto* volume = extensionOf(json, "KHR_materials_volume");
+    if (volume != nullptr && volume->value("thicknessFactor", Json(0.0)) != Json(0.0))
+      context_.warn(pointer_, "'" + out.name +
+                                  "' is a volume that transmits light diffusely: its faces are taken for thin "
+                                  "sheets, and its inside for clear");
+    return {};
   }
 
   void readOthers(const Json& json, Material& out) {

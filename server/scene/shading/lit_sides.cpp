@@ -8,6 +8,7 @@
 #include "common/parallel.h"
 #include "server/scene/shading/emitters.h"
 #include "server/scene/shading/mesh_parts.h"
+#include "server/scene/shading/opacity.h"
 
 namespace radiosity::scene {
 namespace {
@@ -417,6 +418,8 @@ class Probe {
 };
 
 }  // namespace
+
+bool passesLight(const Material& material) { return isSeeThrough(material) || material.isTranslucent(); }
 
 bool SideScene::shines() const {
   return isBright(sky, true) || isBright(sky, false) || !lights.empty() ||

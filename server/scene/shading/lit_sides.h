@@ -28,8 +28,9 @@ struct SideScene {
   struct Group {
     std::uint32_t first = 0, count = 0;  ///< triangles
     std::uint32_t instance = 0;          ///< only triangles of one instance hang together
-    bool double_sided = false, see_through = false;
-    double leaves = 0.0;  ///< about; larger sides are looked at from more places
+    bool double_sided = false;
+    bool see_through = false;  ///< passesLight()
+    double leaves = 0.0;       ///< about; larger sides are looked at from more places
   };
   std::vector<Bvh::Triangle> triangles;  ///< unit box, counter-clockwise seen from the front; group after group
   std::vector<bool> emits;               ///< by triangle
@@ -39,6 +40,10 @@ struct SideScene {
 
   [[nodiscard]] bool shines() const;
 };
+
+/// Whether light that falls on one side may come out on the other. Translucent sheets scatter it; that a path goes
+/// straight on is enough to find out where it may come to.
+[[nodiscard]] bool passesLight(const Material& material);
 
 /// By group and side; kLit for what is not asked, and everywhere in a scene without light. `asked`: by group and side.
 ///

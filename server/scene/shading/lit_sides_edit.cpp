@@ -28,7 +28,7 @@ SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& 
   sides.emits.resize(patches.triangles.size());
   for (const Surface& surface : patches.surfaces) {
     sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,
-                            materialOf(scene, surface).double_sided, surface.see_through,
+                            materialOf(scene, surface).double_sided, passesLight(materialOf(scene, surface)),
                             static_cast<double>(surface.width) * surface.height});
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
       sides.emits[t] = emitters.shines(surface.instance, patches.triangle_source[t]);

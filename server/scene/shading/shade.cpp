@@ -27,9 +27,32 @@ constexpr int kSide = 4;  ///< kSide^2 samples a leaf
 
 using Value = MaterialLayers::Value;
 
+/// What PatchMaterials has of a node. The last two are of translucent materials alone.
+constexpr std::size_t kColours = 6, kOfOneSide = 4;
+template <typename Colour>
+using Colours = std::array<Colour, kColours>;
+
+Colours<SideColours*> coloursOf(PatchMaterials& to) {
+  return {&to.emission, &to.reflectance, &to.specular, &to.lobe, &to.transmittance, &to.base_reflectance};
+}
+
+Colours<glm::vec3> coloursOf(const Value& of) {
+  return {of.emission, of.reflectance, of.specular, of.lobe, of.transmittance, of.base_reflectance};
+}
+
+Value valueOf(const Colours<glm::vec3>& colours) {
+  const auto& [emission, reflectance, specular, lobe, transmittance, base_reflectance] = colours;
+  return {.emission = emission,
+          .reflectance = reflectance,
+          .transmittance = transmittance,
+          .base_reflectance = base_reflectance,
+          .specular = specular,
+          .lobe = lobe};
+}
+
 /// Of a leaf's samples, by how much of the surface is there: the mean of what is everywhere the same is just that.
 struct Sum {
-  glm::dvec3 emission{0.0}, reflectance{0.0}, specular{0.0}, lobe{0.0};
+  Colours<glm::dvec3> colours{};
   double weight = 0.0;
 };
 
@@ -41,6 +64,7 @@ class MaterialShader {
         patches_(patches),
         out_(out),
         name_(materialOf(scene, material).name),
+        is_translucent_(materialOf(scene, material).isTranslucent()),
         layers_(scene, materialOf(scene, material), pyramids) {}
 
   void shade(std::uint32_t id) {
@@ -55,26 +79,29 @@ class MaterialShader {
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
       const auto side = out_.emission.sideOf(first);
-      assign(first, side, emission_, out_.emission);
-      assign(first, side, reflectance_, out_.reflectance);
-      if (out_.specular.sideCount() == 0) continue;
-      assign(first, side, specular_, out_.specular);
-      assign(first, side, lobe_, out_.lobe);
+      for (std::size_t i = 0; i < kColours; ++i) {
+        if (!isKept(i)) continue;
+        average(first, nodes_[i]);
+        coloursOf(out_)[i]->assign(side, nodes_[i]);
+      }
     }
   }
 
   [[nodiscard]] bool wasClamped() const { return was_clamped_; }
+  [[nodiscard]] bool isTranslucent() const { return is_translucent_; }
   [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
   Value clamped(Value value) {
     for (int c = 0; c < 3; ++c) {
-      float& rho = value.reflectance[c];
-      if (rho > kMaxReflectance) {
+      float &rho = value.reflectance[c], &tau = value.transmittance[c];
+      if (const float sum = rho + tau; sum > kMaxReflectance) {
         was_clamped_ = true;
-        rho = kMaxReflectance;
+        rho = tau > 0.0F ? rho * (kMaxReflectance / sum) : kMaxReflectance;
+        tau *= kMaxReflectance / sum;
       }
       if (!(rho > 0.0F)) rho = 0.0F;
+      if (!(tau > 0.0F)) tau = 0.0F;
       if (!(value.specular[c] > 0.0F)) value.specular[c] = 0.0F;
       if (!(value.emission[c] > 0.0F) || !std::isfinite(value.emission[c])) value.emission[c] = 0.0F;
     }
@@ -85,7 +112,8 @@ class MaterialShader {
   static Value folded(Value value) {
     if (std::max({value.specular.r, value.specular.g, value.specular.b}) >= kLeastSpecular || value.lobe.z > 0.0F)
       return value;
-    value.reflectance = glm::min(value.reflectance + value.specular, glm::vec3(kMaxReflectance));
+    value.reflectance = glm::min(value.reflectance + value.specular, kMaxReflectance - value.transmittance);
+    value.base_reflectance = glm::min(value.base_reflectance + value.specular, glm::vec3(kMaxReflectance));
     value.specular = value.lobe = glm::vec3(0.0F);
     return value;
   }
@@ -95,12 +123,15 @@ class MaterialShader {
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
       const auto side = out_.emission.sideOf(first);
-      out_.emission.fill(side, value.emission);
-      out_.reflectance.fill(side, value.reflectance);
-      if (out_.specular.sideCount() == 0) continue;
-      out_.specular.fill(side, value.specular);
-      out_.lobe.fill(side, value.lobe);
+      for (std::size_t i = 0; i < kColours; ++i)
+        if (isKept(i)) coloursOf(out_)[i]->fill(side, coloursOf(value)[i]);
     }
+  }
+
+  /// What would pass to a side without patches is absorbed.
+  [[nodiscard]] bool isKept(std::size_t colour) const {
+    if (colour < kOfOneSide) return coloursOf(out_)[colour]->sideCount() > 0;
+    return is_translucent_ && surface_.first_node[0] != kNone && surface_.first_node[1] != kNone;
   }
 
   [[nodiscard]] glm::vec2 uvAt(const TextureUse& use, const ChartCorners& c, const glm::vec3& w) const {
@@ -133,7 +164,7 @@ class MaterialShader {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
-    for (auto* values : {&emission_, &reflectance_, &specular_, &lobe_}) values->resize(nodes);
+    for (auto& of_nodes : nodes_) of_nodes.resize(nodes);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t) {
       interruptionPoint();
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
@@ -141,18 +172,16 @@ class MaterialShader {
     for (std::size_t i = 0; i < count; ++i) {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;
-      if (sums_[i].weight > 0.0) {
-        const auto& sum = sums_[i];
-        value = {sum.emission / sum.weight, sum.reflectance / sum.weight, 1.0F, sum.specular / sum.weight,
-                 sum.lobe / sum.weight};
+      if (const auto& sum = sums_[i]; sum.weight > 0.0) {
+        Colours<glm::vec3> means;
+        for (std::size_t k = 0; k < kColours; ++k) means[k] = sum.colours[k] / sum.weight;
+        value = valueOf(means);
       } else if (point.triangle != kNone) {
-        value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
+        const auto corners = cornersOf(patches_, point.triangle, *instance_, *primitive_);
+        value = clamped(valueAt(corners, glm::dvec2(point.texel)));
       }
-      value = folded(value);
-      emission_[i] = value.emission;
-      reflectance_[i] = value.reflectance;
-      specular_[i] = value.specular;
-      lobe_[i] = value.lobe;
+      const auto colours = coloursOf(folded(value));
+      for (std::size_t k = 0; k < kColours; ++k) nodes_[k][i] = colours[k];
     }
   }
 
@@ -176,18 +205,11 @@ class MaterialShader {
         if (!(found.weight > 0.0F)) continue;  // nothing is there
         const Value value = clamped(found);
         const double weight = value.weight;
-        sums_[leaf].emission += glm::dvec3(value.emission) * weight;
-        sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
-        sums_[leaf].specular += glm::dvec3(value.specular) * weight;
-        sums_[leaf].lobe += glm::dvec3(value.lobe) * weight;
+        const auto colours = coloursOf(value);
+        for (std::size_t k = 0; k < kColours; ++k) sums_[leaf].colours[k] += glm::dvec3(colours[k]) * weight;
         sums_[leaf].weight += weight;
       }
     }
-  }
-
-  void assign(std::uint32_t first, std::size_t side, std::vector<glm::vec3>& values, SideColours& colours) const {
-    average(first, values);
-    colours.assign(side, values);
   }
 
   /// Of the levels above leaves, by what of them is there on the side that begins with node `first`.
@@ -216,12 +238,13 @@ class MaterialShader {
   const PatchScene& patches_;
   PatchMaterials& out_;
   std::string name_;
+  bool is_translucent_;
   MaterialLayers layers_;
   Surface surface_;
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
-  std::vector<glm::vec3> emission_, reflectance_, specular_, lobe_;  ///< by node of a side
+  Colours<std::vector<glm::vec3>> nodes_;  ///< by node of a side
   bool was_clamped_ = false;
 };
 
@@ -229,21 +252,24 @@ class MaterialShader {
 
 namespace {
 
-/// Room for what reflects as mirrors do, once something does.
-void prepareSpecular(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& materials) {
-  if (materials.specular.sideCount() > 0 || !isSpecular(materialOf(scene, material))) return;
-  materials.specular = materials.lobe = SideColours(patches);
+/// Room for what reflects as mirrors do, and for what passes light on, once something does.
+void makeRoom(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& materials) {
+  const auto& of = materialOf(scene, material);
+  if (materials.specular.sideCount() == 0 && isSpecular(of)) materials.specular = materials.lobe = SideColours(patches);
+  if (materials.transmittance.sideCount() == 0 && of.isTranslucent())
+    materials.transmittance = materials.base_reflectance = SideColours(patches);
 }
 
 /// `surfaces`: those of the material, one at least.
 void shadeSurfaces(const Scene& scene, const PatchScene& patches, std::uint32_t material,
                    std::span<const std::uint32_t> surfaces, TexturePyramids& pyramids, PatchMaterials& materials) {
-  prepareSpecular(scene, patches, material, materials);
+  makeRoom(scene, patches, material, materials);
   MaterialShader shader(scene, patches, material, pyramids, materials);
   for (const std::uint32_t s : surfaces) shader.shade(s);
   if (shader.wasClamped())
-    materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance above {} was lowered to it", material,
-                                             shader.name(), kMaxReflectance));
+    materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance{} above {} was lowered to it", material,
+                                             shader.name(), shader.isTranslucent() ? " and transmittance" : "",
+                                             kMaxReflectance));
 }
 
 }  // namespace

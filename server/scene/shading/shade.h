@@ -10,7 +10,7 @@
 namespace radiosity::scene {
 
 /// Leaves are integrated over textures and vertex colours (16 samples a leaf), parents are area-weighted means.
-/// Reflectance is clamped to 0.999.
+/// Reflectance is clamped to 0.999; with transmittance, the sum of both.
 [[nodiscard]] PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches);
 
 /// Recomputes the nodes of the surfaces that use `material`; returns those surfaces.

@@ -5,6 +5,8 @@
 namespace radiosity::scene {
 namespace {
 
+constexpr float kLeastStopped = 1e-3F;  ///< of the rays at what passes nearly all
+
 /// Whether two textures have the same place everywhere.
 bool laidAlike(TextureUse a, const TextureUse& b) {
   a.texture = b.texture;
@@ -17,9 +19,11 @@ bool laidAlike(TextureUse a, const TextureUse& b) {
 MaterialLayers::MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids)
     : scene_(scene), material_(material) {
   is_specular_ = isSpecular(material_);
+  stopped_ = stoppedDiffuse();
   addSurface(pyramids);
   if (is_specular_) addSpecularLooks(pyramids);
   if (material_.emission != glm::vec3(0.0F)) addEmissive(pyramids);
+  if (material_.isTranslucent()) addTransmission(pyramids);
 }
 
 const Texture* MaterialLayers::textureOf(const TextureUse& use) const {
@@ -51,8 +55,10 @@ void MaterialLayers::addSurface(TexturePyramids& pyramids) {
   const TextureUse& use = base != nullptr       ? material_.base_color_texture
                           : metallic != nullptr ? material_.metallic_texture
                                                 : material_.specular_texture;
-  metallic_inside_ = metallic != nullptr && laidAlike(material_.metallic_texture, use);
-  specular_inside_ = specular != nullptr && laidAlike(material_.specular_texture, use);
+  // Metal takes from transmitted light, too, which has a colour of its own.
+  const bool joins = !material_.isTranslucent();
+  metallic_inside_ = joins && metallic != nullptr && laidAlike(material_.metallic_texture, use);
+  specular_inside_ = joins && specular != nullptr && laidAlike(material_.specular_texture, use);
   if (metallic != nullptr && !metallic_inside_)
     metallic_.emplace(Layer{material_.metallic_texture, pyramids.of({.colour = metallic})});
   if (specular != nullptr && !specular_inside_)
@@ -95,10 +101,6 @@ void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::
     const auto face = glassFace(material_);
     value.specular = glm::vec3(face.facing);
     value.lobe.z = enteredPart(material_);
-    // What is left of the light that neither passes nor is reflected, as a part of what does not pass.
-    const float stopped = face.meanStopped(1.0F - passedPart(material_)),
-                reflected = face.meanStopped(face.reflectance(0.0F));
-    value.reflectance *= stopped > 0.0F ? (1.0F - material_.transmission) * (1.0F - reflected) / stopped : 0.0F;
   } else if (material_.specular != glm::vec3(0.0F)) {
     value.specular = material_.specular * shine;
     value.lobe.y = std::max({value.specular.r, value.specular.g, value.specular.b});
@@ -108,12 +110,23 @@ void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::
   }
 }
 
+/// The part that is scattered, reflected or passed on, of the light that neither passes nor is reflected as by a
+/// mirror: as a part of what does not pass, for rays that do not pass are what meets it.
+float MaterialLayers::stoppedDiffuse() const {
+  if (material_.transmission <= 0.0F) return 1.0F;
+  if (!isGlass(material_))
+    return (1.0F - material_.transmission) / std::max(1.0F - passedPart(material_), kLeastStopped);
+  const auto face = glassFace(material_);
+  const float stopped = face.meanStopped(1.0F - passedPart(material_)),
+              reflected = face.meanStopped(face.reflectance(0.0F));
+  return stopped > 0.0F ? (1.0F - material_.transmission) * (1.0F - reflected) / stopped : 0.0F;
+}
+
 /// Rays that do not pass meet what is left, as parts of these.
 void MaterialLayers::takePassing(Value& value) const {
-  const float passed = passedPart(material_);
+  value.reflectance *= stopped_;
   if (material_.transmission <= 0.0F || isGlass(material_)) return;
-  const float stopped = std::max(1.0F - passed, 1e-3F);
-  value.reflectance *= (1.0F - material_.transmission) / stopped;
+  const float stopped = std::max(1.0F - passedPart(material_), kLeastStopped);
   value.specular = glm::min(value.specular / stopped, glm::vec3(1.0F));
 }
 
@@ -126,6 +139,13 @@ void MaterialLayers::addEmissive(TexturePyramids& pyramids) {
   PictureStack stack{.colour = light};
   if (covered) setAlpha(base, stack);
   emissive_.emplace(Layer{material_.emissive_texture, pyramids.of(stack)});
+}
+
+void MaterialLayers::addTransmission(TexturePyramids& pyramids) {
+  if (const Texture* part = textureOf(material_.diffuse_transmission_texture))
+    passing_.emplace(Layer{material_.diffuse_transmission_texture, pyramids.of({.alpha = part})});
+  if (const Texture* colour = textureOf(material_.diffuse_transmission_color_texture))
+    glow_.emplace(Layer{material_.diffuse_transmission_color_texture, pyramids.of({.colour = colour})});
 }
 
 }  // namespace radiosity::scene

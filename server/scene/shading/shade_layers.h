@@ -16,6 +16,7 @@ class MaterialLayers {
  public:
   struct Value {
     glm::vec3 emission{0.0F}, reflectance{0.0F};
+    glm::vec3 transmittance{0.0F}, base_reflectance{0.0F};  ///< as of PatchMaterials; of translucent materials
     float weight = 1.0F;  ///< how much of the surface is there: 0 where it is cut out, alpha where it is blended
     glm::vec3 specular{0.0F}, lobe{0.0F};  ///< of PatchMaterials
   };
@@ -28,7 +29,7 @@ class MaterialLayers {
 
   /// Without textures it is the same everywhere, but for vertex colours.
   [[nodiscard]] bool hasTextures() const {
-    return surface_ || metallic_ || specular_ || emissive_ || specular_look_.rough;
+    return surface_ || metallic_ || specular_ || emissive_ || passing_ || glow_ || specular_look_.rough;
   }
 
   /// `place(use)` gives the Place of a texture; `vertex` is COLOR_0 there.
@@ -42,8 +43,10 @@ class MaterialLayers {
     glm::vec3 specular = specular_inside_ ? glm::vec3(0.0F) : material_.specular;
     if (metallic_) metal *= look(*metallic_).rgb.b;
     if (specular_) specular *= look(*specular_).rgb;
-    Value value{material_.emission * static_cast<float>(M_PI), diffuseOf(metal, specular) * glm::vec3(vertex),
-                weightOf(vertex.a)};
+    const float diffuse = diffuseOf(metal, specular);
+    Value value{.emission = material_.emission * static_cast<float>(M_PI),
+                .reflectance = material_.base_color * diffuse * glm::vec3(vertex),
+                .weight = weightOf(vertex.a)};
     if (surface_) {
       const auto found = look(*surface_);
       value.reflectance *= found.rgb;
@@ -59,6 +62,13 @@ class MaterialLayers {
     }
     takePassing(value);
     if (emissive_) value.emission *= look(*emissive_).rgb;
+    if (material_.isTranslucent()) {
+      const float part = material_.diffuse_transmission * (passing_ ? look(*passing_).coverage : 1.0F);
+      value.transmittance = material_.diffuse_transmission_color * (diffuse * stopped_ * part);
+      if (glow_) value.transmittance *= look(*glow_).rgb;
+      value.base_reflectance = value.reflectance;
+      value.reflectance *= 1.0F - part;
+    }
     return value;
   }
 
@@ -68,10 +78,12 @@ class MaterialLayers {
     std::shared_ptr<const TexturePyramid> pyramid;
   };
 
-  [[nodiscard]] glm::vec3 diffuseOf(float metal, const glm::vec3& specular) const {
-    return material_.base_color * (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
+  /// The part of light that diffuse reflection and transmission share.
+  [[nodiscard]] static float diffuseOf(float metal, const glm::vec3& specular) {
+    return (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
   }
   void addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough, Value& value) const;
+  [[nodiscard]] float stoppedDiffuse() const;
   void takePassing(Value& value) const;
   void addSpecularLooks(TexturePyramids& pyramids);
   [[nodiscard]] float weightOf(float vertex_alpha) const;
@@ -79,6 +91,7 @@ class MaterialLayers {
   void setAlpha(const Texture* alpha, PictureStack& stack) const;
   void addSurface(TexturePyramids& pyramids);
   void addEmissive(TexturePyramids& pyramids);
+  void addTransmission(TexturePyramids& pyramids);
 
   const Scene& scene_;
   Material material_;
@@ -87,7 +100,9 @@ class MaterialLayers {
   std::optional<Layer> surface_;
   bool metallic_inside_ = false, specular_inside_ = false;  ///< of `surface_`
   std::optional<Layer> metallic_, specular_, emissive_;     ///< by themselves
+  std::optional<Layer> passing_, glow_;                     ///< of diffuse transmission: how much, and its colour
   bool is_specular_ = false;
+  float stopped_ = 1.0F;  ///< see stoppedDiffuse()
   struct SpecularLook {
     std::optional<Layer> base, metal, shine, rough;
   };

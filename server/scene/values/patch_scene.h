@@ -272,6 +272,12 @@ void joinBoxes(std::vector<ChangedBox>& boxes);
 struct PatchMaterials {
   SideColours emission;
   SideColours reflectance;  ///< diffuse
+  /// Of the irradiance of a node's other side the part that leaves on this one: B = E + rho H + tau H_other. rho + tau
+  /// is at most 0.999. Empty (no sides): nothing in the scene is translucent.
+  SideColours transmittance;
+  /// Where `transmittance` is not black: reflectance as the material would have it without diffuse transmission, by
+  /// which renderers that do not know the extension multiply lightmaps. Empty likewise.
+  SideColours base_reflectance;
   /// Where surfaces reflect as mirrors do (specular.h): by how much of what comes straight at them, and, of `lobe`, x
   /// the roughness, y the reflectance at a grazing angle, and z how much of what glass does not reflect passes (there
   /// Surface::glass has the law of angles). No sides: nothing does.

@@ -65,6 +65,15 @@ struct Material {
   TextureUse metallic_texture;   ///< its blue channel multiplies `metallic`
   TextureUse roughness_texture;  ///< its green channel multiplies `roughness`; of metal alone
   TextureUse specular_texture;   ///< RGB multiplies `specular`
+  /// KHR_materials_diffuse_transmission: of the light that is not reflected specularly the part that leaves diffusely
+  /// on the other side, and its colour, linear. Above 0: `double_sided`.
+  float diffuse_transmission = 0.0F;
+  glm::vec3 diffuse_transmission_color{1.0F};
+  TextureUse diffuse_transmission_texture;        ///< its alpha channel multiplies `diffuse_transmission`
+  TextureUse diffuse_transmission_color_texture;  ///< RGB multiplies `diffuse_transmission_color`
+
+  /// Paper, a leaf, a lampshade: light that arrives on one side leaves on both.
+  [[nodiscard]] bool isTranslucent() const { return diffuse_transmission > 0.0F; }
 
   bool operator==(const Material&) const = default;
 };

@@ -197,7 +197,9 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
     const auto emission = materials_.emission.side(side.number), reflectance = materials_.reflectance.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf, ++number) {
       const auto node = side.first_node + leaf;
-      const auto light = emission[leaf] + reflectance[leaf] * irradiance[node];
+      auto light = emission[leaf] + reflectance[leaf] * irradiance[node];
+      if (side.other != scene::kNone && materials_.transmittance.sideCount() > 0)
+        light += materials_.transmittance.side(side.number)[leaf] * irradiance[sides_[side.other].first_node + leaf];
       senders.add(number, channelSum(light) * static_cast<double>(patches_.node_area[node]));
     }
   }

@@ -43,7 +43,7 @@ void LinkSystem::makeRows() {
 
 /// A column is made anew where its links changed, others for the nodes alone whose rows are not there yet.
 void LinkSystem::updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end) {
-  thread_local std::vector<float> links;
+  thread_local std::vector<float> links, beyond;
   const auto& changed = changed_[half];
   const bool any_changed = std::find(changed.begin() + first, changed.begin() + end, true) != changed.begin() + end;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
@@ -51,17 +51,23 @@ void LinkSystem::updateColumns(std::size_t half, std::uint32_t first, std::uint3
     const bool has_new_rows = std::ranges::any_of(members, [&](std::uint32_t m) { return !hasRow(m); });
     if (members.empty() || (!any_changed && !has_new_rows)) continue;
     links.resize(sides_[s].leaf_count);
+    beyond.resize(links.size());
+    const bool lets_through = letsThrough(sides_[s]);
     for (auto column = first; column < end; ++column) {
       if (!changed[column] && !has_new_rows) continue;
-      if (!shooters_[column].column[half].decode(sides_[s].first_value, links)) continue;
+      const auto& of_column = shooters_[column].column[half];
+      SideLinks found;
+      if (of_column.decode(sides_[s].first_value, links)) found.own = links.data();
+      if (lets_through && of_column.decode(sides_[sides_[s].other].first_value, beyond)) found.beyond = beyond.data();
+      if (found.own == nullptr && found.beyond == nullptr) continue;
       for (const auto m : members) {
-        if (changed[column] || !hasRow(m)) fillRow(half, m, column, links.data());
+        if (changed[column] || !hasRow(m)) fillRow(half, m, column, found);
       }
     }
   }
 }
 
-void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links) {
+void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const SideLinks& links) {
   const NodePlace& place = shooters_[member].place;
   const Side& side = sides_[place.side];
   const auto rect = leafRect(side, place);
@@ -72,7 +78,7 @@ void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t c
     double sum = 0.0;
     for (auto y = rect.y0; y < rect.y1; ++y) {
       const auto first = y * side.width + rect.x0;
-      sum += static_cast<double>(dot(area + first, links + first, rect.x1 - rect.x0));
+      sum += static_cast<double>(dot(area + first, links.own + first, rect.x1 - rect.x0));
     }
     halves_[half].matrix[row.first][column] = static_cast<float>(sum / whole);
     return;
@@ -82,7 +88,9 @@ void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t c
   for (auto y = rect.y0; y < rect.y1; ++y) {
     for (auto x = rect.x0; x < rect.x1; ++x) {
       const auto leaf = y * side.width + x;
-      sum += glm::dvec3(area[leaf] * links[leaf] * reflectance[leaf]);
+      if (links.own != nullptr) sum += glm::dvec3(area[leaf] * links.own[leaf] * reflectance[leaf]);
+      if (links.beyond != nullptr)
+        sum += glm::dvec3(area[leaf] * links.beyond[leaf] * transmittance_.side(side.number)[leaf]);
     }
   }
   for (int c = 0; c < 3; ++c)
@@ -125,13 +133,19 @@ bool LinkSystem::hasSameReflectance(std::uint32_t member, const LinkSystem& form
   const NodePlace &place = shooters_[member].place, &old_place = former.shooters_[old_member].place;
   const Side &side = sides_[place.side], &old_side = former.sides_[old_place.side];
   const auto rect = leafRect(side, place);
-  const auto now = reflectance_.side(side.number), before = former.reflectance_.side(old_side.number);
-  for (auto y = rect.y0; y < rect.y1; ++y) {
-    for (auto x = rect.x0; x < rect.x1; ++x) {
-      if (now[y * side.width + x] != before[y * side.width + x]) return false;
+  const auto isSame = [&](const scene::SideColours& in_this, const scene::SideColours& in_former) {
+    const auto now = in_this.side(side.number), before = in_former.side(old_side.number);
+    for (auto y = rect.y0; y < rect.y1; ++y) {
+      for (auto x = rect.x0; x < rect.x1; ++x) {
+        if (now[y * side.width + x] != before[y * side.width + x]) return false;
+      }
     }
-  }
-  return true;
+    return true;
+  };
+  if (!isSame(reflectance_, former.reflectance_)) return false;
+  const bool lets_through = letsThrough(side);
+  if (lets_through != former.letsThrough(old_side)) return false;
+  return !lets_through || isSame(transmittance_, former.transmittance_);
 }
 
 }  // namespace radiosity::solver

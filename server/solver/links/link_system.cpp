@@ -14,6 +14,11 @@ namespace {
 /// A sample of links is off by its rounding alone when its sum is as near as this to what was sent.
 constexpr double kOnlyRounding = 1e-4;
 
+/// Rows of translucent sides hold it.
+bool isSameTransmittance(const scene::SideColours& a, const scene::SideColours& b) {
+  return a.sideCount() == b.sideCount() && (a.sideCount() == 0 || a == b);
+}
+
 }  // namespace
 
 double Shooter::power() const { return 0.5 * static_cast<double>(channelSum(sent[0] + sent[1])) * area; }
@@ -65,14 +70,20 @@ void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
   changed_[half][index] = true;
 }
 
-void LinkSystem::setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance) {
-  bool same_rows = reflectance_.sideCount() == reflectance.sideCount();
+bool LinkSystem::letsThrough(const Side& side) const { return !passingTo(passing_, side).empty(); }
+
+void LinkSystem::setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance,
+                              const scene::SideColours& transmittance) {
+  bool same_rows =
+      reflectance_.sideCount() == reflectance.sideCount() && isSameTransmittance(transmittance_, transmittance);
+  transmittance_ = transmittance;
+  passing_ = passingLeaves(transmittance, sides_, leaf_area_);
   for (std::size_t s = 0; s < sides_.size(); ++s) {
     const Side& side = sides_[s];
     const auto now = reflectance.side(s), before = same_rows ? reflectance_.side(s) : now;
     std::uint32_t first = scene::kNone;
-    bool uniform = true, same = same_rows;
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count && !now.isUniform(); ++leaf) {
+    bool uniform = !letsThrough(side), same = same_rows;
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count && !(uniform && now.isUniform()); ++leaf) {
       if (patches_.node_area[side.first_node + leaf] <= 0.0F) continue;
       if (first == scene::kNone) first = leaf;
       if (now[leaf] != now[first]) uniform = false;

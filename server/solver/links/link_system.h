@@ -4,6 +4,8 @@
 //
 //   b_m = e_m + mean over node m of rho sum_n T_n w_n b_n
 //
+// and, of what is translucent, likewise of tau and the links to the other side,
+//
 // where T_n are the links of shooter n to leaves, and w_n its roulette weight. What leaves have beside, LeafGather
 // brings.
 //
@@ -20,6 +22,7 @@
 #include <vector>
 
 #include "server/solver/math/gmres.h"
+#include "server/solver/patches/passing.h"
 #include "server/solver/patches/side.h"
 #include "server/solver/transport/link_column.h"
 
@@ -61,10 +64,15 @@ class LinkSystem {
  public:
   LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
-  /// Entries of the matrix stay unless they hold a reflectance that changed.
-  void setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance);
+  /// Entries of the matrix stay unless they hold a reflectance or transmittance that changed. `transmittance`: empty
+  /// where nothing is translucent.
+  void setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance,
+                    const scene::SideColours& transmittance = {});
   [[nodiscard]] const scene::SideColours& emission() const { return emission_; }
   [[nodiscard]] const scene::SideColours& reflectance() const { return reflectance_; }
+  [[nodiscard]] const scene::SideColours& transmittance() const { return transmittance_; }
+  /// All leaves that let light through (passing.h).
+  [[nodiscard]] std::span<const PassingLeaf> passing() const { return passing_; }
   /// Unit box squared, by leaf value.
   [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
 
@@ -139,7 +147,7 @@ class LinkSystem {
 
  private:
   struct Rows {
-    std::uint32_t first = 0, count = 0;  ///< one if the node is of one reflectance, else one a channel
+    std::uint32_t first = 0, count = 0;  ///< one if the node is of one reflectance and opaque, else one a channel
   };
   struct Half {
     std::vector<std::vector<float>> matrix;  ///< by row: entries by column
@@ -163,7 +171,12 @@ class LinkSystem {
   }
   [[nodiscard]] bool hasSameReflectance(std::uint32_t member, const LinkSystem& former, std::uint32_t old_member) const;
   void updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end);
-  void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
+  /// Links to the leaves of a side, and to those of its other side where that lets light through; null: there are none.
+  struct SideLinks {
+    const float *own = nullptr, *beyond = nullptr;
+  };
+  void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const SideLinks& links);
+  [[nodiscard]] bool letsThrough(const Side& side) const;
   void beginHalf(std::size_t half);
   void advanceHalf(std::size_t half);
   void sweep(std::size_t half, Gmres<double>::Vectors& sent, bool affine);
@@ -185,9 +198,10 @@ class LinkSystem {
   std::size_t known_ = 0;                            // shooters whose rows are there
   std::uint32_t next_column_ = 0;                    // to be brought up to date
   std::array<Half, 2> halves_;
-  scene::SideColours emission_, reflectance_;
+  scene::SideColours emission_, reflectance_, transmittance_;
+  std::vector<PassingLeaf> passing_;
   std::vector<float> leaf_area_;  // by leaf value
-  std::vector<bool> uniform_;     // by side: of one reflectance
+  std::vector<bool> uniform_;     // by side: of one reflectance, and opaque
 };
 
 }  // namespace radiosity::solver

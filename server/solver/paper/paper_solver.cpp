@@ -172,6 +172,13 @@ std::optional<ScatterShot> PaperSolver::shotFrom(const NodePlace& node) {
   return shot;
 }
 
+/// Of light that arrives on a side, about: what leaves on the other.
+double PaperSolver::passedPart(const Side& side) const {
+  if (!trees_.letsThrough(side)) return 0.0;
+  const auto mean = trees_.transmittance(side, side.node_count - 1);
+  return (mean.x + mean.y + mean.z) / 3.0;
+}
+
 /// Section 4.1: what the pixels of the hemicube name gets the flux of their delta form factors.
 Result<void> PaperSolver::carry(const ShotBatch& batch) {
   shown_.reset();
@@ -186,7 +193,7 @@ Result<void> PaperSolver::carry(const ShotBatch& batch) {
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = static_cast<double>(flux_.node[0][i][c] + flux_.node[1][i][c]) / trees_.fluxScale();
         received_ += flux;
-        reflected_ += flux * static_cast<double>(side.mean_reflectance);
+        reflected_ += flux * (static_cast<double>(side.mean_reflectance) + passedPart(side));
       }
   return {};
 }
@@ -242,6 +249,8 @@ EnergyParts PaperSolver::energy() const {
       const auto node = side.first_node + leaf;
       const auto area = static_cast<double>(patches_->node_area[node]);
       absorbed += area * (1.0 - glm::dvec3(trees.reflectance(side, leaf))) * trees.irradiance(node);
+      if (trees.letsThrough(side))
+        absorbed -= area * trees.transmittance(side, leaf) * trees.irradiance(trees.otherOf(side).first_node + leaf);
       unshot += area * trees.unshot(node);
     }
   const auto escaped = trees.escaped(), backface = trees.backface();

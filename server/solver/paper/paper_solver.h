@@ -55,6 +55,7 @@ class PaperSolver final : public Solver {
   [[nodiscard]] std::uint32_t resolutionFor(double power) const;
   [[nodiscard]] Result<void> carry(const ShotBatch& batch);
   void settleError();
+  [[nodiscard]] double passedPart(const Side& side) const;
   [[nodiscard]] const PatchTrees& shown() const;
   [[nodiscard]] bool isDone() const { return error_.residual <= settings_.target_error; }
 

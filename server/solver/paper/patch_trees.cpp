@@ -83,6 +83,10 @@ void PatchTrees::receive(const FluxAccumulators& shot) {
     if (arrived <= 0.0) continue;
     side.dirty = true;
     side.unshot_power += arrived * static_cast<double>(side.mean_reflectance);
+    if (letsThrough(side)) {
+      auto& other = sides_[side.other];
+      other.unshot_power += arrived * channels(transmittance(other, other.node_count - 1)) / 3.0;
+    }
   }
   add(escaped_, shot.escaped);
   add(backface_, shot.backface);
@@ -90,10 +94,17 @@ void PatchTrees::receive(const FluxAccumulators& shot) {
 
 void PatchTrees::pushPull(std::uint32_t number) {
   auto& side = sides_[number];
-  if (!std::exchange(side.dirty, false)) return;
-  smooth(side);
-  push(side);
+  const bool lets_through = letsThrough(side);
+  bool arrived = false;
+  for (auto* pushed : {&side, lets_through ? &sides_[side.other] : nullptr}) {
+    if (pushed == nullptr || !std::exchange(pushed->dirty, false)) continue;
+    arrived = true;
+    smooth(*pushed);
+    push(*pushed);
+  }
+  if (!arrived) return;
   pull(side);
+  if (lets_through) pull(sides_[side.other]);  // what arrived on one side is unshot on both
 }
 
 void PatchTrees::pushPullAll() {
@@ -152,6 +163,10 @@ void PatchTrees::push(const Side& side) {
     if (!(patches_->node_area[side.first_node + leaf] > 0.0F)) continue;
     irradiance_[side.first_node + leaf] += above[leaf];
     unshot_[side.first_node + leaf] += glm::dvec3(reflectance(side, leaf)) * above[leaf];
+    if (!letsThrough(side)) continue;
+    const auto& other = sides_[side.other];
+    if (patches_->node_area[other.first_node + leaf] > 0.0F)
+      unshot_[other.first_node + leaf] += transmittance(other, leaf) * above[leaf];
   }
 }
 

@@ -50,6 +50,15 @@ class PatchTrees {
   [[nodiscard]] glm::vec3 reflectance(const Side& side, std::uint32_t leaf) const {
     return materials_.reflectance.side(side.number)[leaf];
   }
+  /// Of light on the other side of a leaf the part that leaves here.
+  [[nodiscard]] glm::dvec3 transmittance(const Side& side, std::uint32_t leaf) const {
+    if (side.other == scene::kNone || materials_.transmittance.sideCount() == 0) return glm::dvec3(0.0);
+    return glm::dvec3(materials_.transmittance.side(side.number)[leaf]);
+  }
+  [[nodiscard]] const Side& otherOf(const Side& side) const { return sides_[side.other]; }
+  [[nodiscard]] bool letsThrough(const Side& side) const {
+    return side.other != scene::kNone && transmittance(side, side.node_count - 1) != glm::dvec3(0.0);
+  }
   /// Flux that left the scene, and that fell on unlit sides or on nothing, lux unit^2.
   [[nodiscard]] glm::dvec3 escaped() const;
   [[nodiscard]] glm::dvec3 backface() const;

@@ -7,6 +7,9 @@ namespace radiosity::solver {
 std::vector<Side> makeSides(const scene::PatchScene& patches) {
   std::vector<Side> sides;
   std::uint32_t values = 0;
+  const auto hasBoth = [](const scene::Surface& surface) {
+    return surface.first_node[0] != scene::kNone && surface.first_node[1] != scene::kNone;
+  };
   for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
     const auto& surface = patches.surfaces[s];
     for (std::uint32_t face = 0; face < 2; ++face) {
@@ -15,6 +18,7 @@ std::vector<Side> makeSides(const scene::PatchScene& patches) {
       side.number = static_cast<std::uint32_t>(sides.size());
       side.surface = s;
       side.side = face;
+      if (hasBoth(surface)) side.other = face == 0 ? side.number + 1 : side.number - 1;
       side.first_node = side.key = surface.first_node[face];
       side.triangle_key = surface.first_triangle;
       side.width = surface.width;

@@ -17,8 +17,9 @@ inline constexpr std::size_t kLeavesAThread = 4096;
 struct Side {
   std::uint32_t number = 0;  ///< among all sides; by it SideColours knows it
   std::uint32_t surface = 0;
-  std::uint32_t side = 0;        ///< 0 front, 1 back
-  std::uint32_t first_node = 0;  ///< level 0 starts here
+  std::uint32_t side = 0;              ///< 0 front, 1 back
+  std::uint32_t other = scene::kNone;  ///< number of the surface's other side, where that has patches, too
+  std::uint32_t first_node = 0;        ///< level 0 starts here
   /// For sample sequences, and to know light polygons again: stay with the side whatever an edit does to the numbers of
   /// nodes and triangles. A scene that is no edit of another has its own numbers here: first_node, and the surface's
   /// first triangle.

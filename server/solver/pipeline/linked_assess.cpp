@@ -125,6 +125,7 @@ LinkedSolver::FieldSums LinkedSolver::assessField() const {
       sums.received += static_cast<double>(channelSum(flux));
       sums.reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
     }
+    sums.reflected += static_cast<double>(channelSum(glm::vec3(passedFlux(side))));
     of_side[s].emplace(sums);
   };
   inTurns(sides_.size(), assessSide, system_.leafAreas().size() / kLeavesAThread);
@@ -135,6 +136,14 @@ LinkedSolver::FieldSums LinkedSolver::assessField() const {
     all.reflected += sums->reflected;
   }
   return all;
+}
+
+/// Flux that leaves a side since it arrived on the other.
+glm::dvec3 LinkedSolver::passedFlux(const Side& side) const {
+  glm::dvec3 flux(0.0);
+  for (const auto& leaf : passingTo(system_.passing(), side))
+    flux += glm::dvec3(leaf.transmittance * lightOf(leaf.from) * system_.leafAreas()[leaf.to]);
+  return flux;
 }
 
 double LinkedSolver::fieldNorm() const {
@@ -226,6 +235,7 @@ double LinkedSolver::powerToShoot() const {
       received += static_cast<double>(channelSum(flux));
       reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
     }
+    reflected += static_cast<double>(channelSum(glm::vec3(passedFlux(side))));
   }
   const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
   return shot + net_unshot_ / (1.0 - kept);
@@ -263,7 +273,8 @@ EnergyParts LinkedSolver::energy() const {
   for (const auto& side : sides_) {
     const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
     const auto emission = system_.emission().side(side.number), reflectance = system_.reflectance().side(side.number);
-    glm::dvec3 emitted(0.0), absorbed(0.0), specular(0.0);
+    // What the other side has absorbed of this side's light is that side's, and this one's less.
+    glm::dvec3 emitted(0.0), absorbed = -passedFlux(side), specular(0.0);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
       emitted += area * glm::dvec3(emission[leaf]);

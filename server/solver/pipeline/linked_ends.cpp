@@ -39,7 +39,8 @@ std::uint64_t LinkedSolver::lightKey() const {
   std::uint64_t sources = 0;  // in whatever order
   for (const auto& source : sources_) sources += keyOf(source);
   for (const auto& source : sky_) sources += keyOf(source);
-  const auto key = mixKeys(mixKeys(keyOf(system_.emission(), sides_), keyOf(system_.reflectance(), sides_)), sources);
+  auto key = mixKeys(mixKeys(keyOf(system_.emission(), sides_), keyOf(system_.reflectance(), sides_)), sources);
+  if (!system_.passing().empty()) key = mixKeys(key, keyOf(system_.transmittance(), sides_));
   return mirrors_ ? mixKeys(key, mirrors_->key()) : key;
 }
 

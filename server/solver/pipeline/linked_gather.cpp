@@ -180,6 +180,7 @@ LeftLight LinkedSolver::leftLight() const {
   if (mirrors_) light.lamps = lampsOfLeaves();
   const auto spread = spreadLight();
   for (std::size_t value = 0; value < spread.size(); ++value) light.emission[value] += spread[value];
+  light.passing.assign(system_.passing().begin(), system_.passing().end());
   light.irradiance = over_links_;
   SkyLight sky(sky_);
   light.sky = sky.hemispheres;

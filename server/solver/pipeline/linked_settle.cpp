@@ -114,6 +114,8 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, U
     const glm::vec3 own = side.gathered ? glm::vec3(0.0F) : emission[leaf];
     leaves[leaf] = reflectance[leaf] * lightOf(side.first_value + leaf) + own - leaves[leaf];
   }
+  for (const auto& leaf : passingTo(system_.passing(), side))
+    leaves[leaf.to - side.first_value] += leaf.transmittance * lightOf(leaf.from);
 }
 
 /// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.

@@ -84,7 +84,7 @@ void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals
 }
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
-  system_.setMaterials(materials.emission, materials.reflectance);
+  system_.setMaterials(materials.emission, materials.reflectance, materials.transmittance);
   mirrors_ = SpecularLeaves::find(sides_, materials, patches_->surfaces);
   if (gather_) gather_->reflectBy(mirrors_);
   takeLights();
@@ -98,6 +98,8 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
       area += a;
     }
   }
+  for (const auto& leaf : system_.passing())
+    reflectance += glm::dvec3(leaf.transmittance * system_.leafAreas()[leaf.to]);
   planner_.setReflectance(area > 0.0 ? std::max({reflectance.x, reflectance.y, reflectance.z}) / area : 0.0);
 }
 

@@ -58,11 +58,22 @@ void LinkedSolver::updateVariation() {
 /// The light that leaves have now.
 bool LinkedSolver::withLeafLight(const std::function<bool(const LeafLight&)>& work) const {
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
+  std::array<std::vector<glm::vec3>, 2> passed;
+  for (std::size_t half = 0; half < 2 && !system_.passing().empty(); ++half) {
+    passed[half].assign(emission.size(), glm::vec3(0.0F));
+    for (const auto& leaf : system_.passing()) passed[half][leaf.to] = leaf.of(half_[half]);
+  }
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
   const SkyLight sky(sources);
-  return work(
-      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr, &sky});
+  return work({emission,
+               reflectance,
+               {half_[0], half_[1]},
+               lights_,
+               sources,
+               gathers() ? &gather_->sights() : nullptr,
+               &sky,
+               {passed[0], passed[1]}});
 }
 
 /// What is to be reached by links, beside what varies within leaves.

@@ -39,6 +39,7 @@ class Half {
     double before = total();
     for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
       for (std::size_t v = 0; v < count_; ++v) radiosity[v] = light_.reflectance()[v] * irradiance_[v];
+      for (const auto& leaf : light_.passing()) radiosity[leaf.to] += leaf.of(irradiance_);
       inParts([&](std::size_t value) { next[value] = from_sky_[value] + gathered(value, radiosity); });
       irradiance_.swap(next);
       const double now = total();

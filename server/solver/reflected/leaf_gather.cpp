@@ -163,6 +163,7 @@ bool LeafGather::advance(double seconds) {
       smoother_.emplace(sides_, area_, [this](std::uint32_t v) { return sights_.isParted(v); });
     }
     is_weighed_ = true;
+    joinParts();
     inBothHalves([&](std::size_t half) { takeLight(half); });
     stage_ = Stage::kSolving;
   }
@@ -182,6 +183,10 @@ bool LeafGather::advance(double seconds) {
 void LeafGather::finish() {
   takeSolutions();
   smoother_->smooth(solved_);
+  for (std::size_t half = 0; half < 2; ++half) {
+    const auto& x = solved_[half];
+    passOn(half, [&](std::uint32_t v) { return std::array{x[0][v], x[1][v], x[2][v]}; });
+  }
   std::array<Levels, 2> levels;
   inBothHalves([&](std::size_t half) {
     levels[half] = this->levels(half);
@@ -223,6 +228,7 @@ void LeafGather::takeLight(std::size_t h) {
   takeSky(h);
   takeMirrors(h);
   half.arriving.assign(leaves, {});
+  half.passed.assign(light_.passing.empty() ? 0 : leaves, {});
   std::vector<SourceSum> sums(sides_.size());
   takeSources(h, sums);
   Light shining{};
@@ -275,15 +281,27 @@ void LeafGather::average(std::size_t half) {
 void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source) {
   if (light_.mirrors) return followMirrors(half, source);
   auto& radiosity = halves_[half].radiosity;
+  const auto& passed = halves_[half].passed;
   auto to = radiosity.begin() + sights_.endCount();
   for (const auto& step : sights_.steps(half)) {
     const auto& reflectance = light_.reflectance[step.by];
     const auto& next = radiosity[step.next];
     for (std::size_t c = 0; c < 3; ++c) {
-      const float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+      float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+      if (!passed.empty()) own += passed[step.by][c];
       (*to)[c] = reflectance[static_cast<int>(c)] * next[c] + own;
     }
     ++to;
+  }
+}
+
+/// What arrives on the other side of translucent leaves; arriving(leaf value) has it by channel.
+template <typename Arriving>
+void LeafGather::passOn(std::size_t half, const Arriving& arriving) {
+  for (const auto& leaf : light_.passing) {
+    const auto& light = arriving(leaf.from);
+    for (std::size_t c = 0; c < 3; ++c)
+      halves_[half].passed[leaf.to][c] = leaf.transmittance[static_cast<int>(c)] * static_cast<float>(light[c]);
   }
 }
 
@@ -295,6 +313,8 @@ void LeafGather::sweep(std::size_t h, RayGmres::Vectors& x, bool affine) {
       half.radiosity[v][c] = light_.reflectance[v][static_cast<int>(c)] * x[c][v] +
                              (affine ? static_cast<float>(half.source[v][c]) : 0.0F);
   }
+  passOn(h, [&](std::uint32_t v) { return std::array{x[0][v], x[1][v], x[2][v]}; });
+  for (const auto& leaf : light_.passing) add(half.radiosity[leaf.to], half.passed[leaf.to]);
   for (auto end = leaves; end < half.source.size(); ++end)
     half.radiosity[end] = affine ? rounded(half.source[end]) : Light32{};
   followSteps(h, affine ? &half.source : nullptr);
@@ -320,6 +340,11 @@ void LeafGather::weighNoise() {
     }
   });
   meanOfShot();
+  for (auto& half : halves_) half.passed.clear();
+  for (const auto& leaf : light_.passing) {  // as all that leaves send but do not reflect
+    const auto passed = leaf.transmittance * 0.5F * (gathered_[0][leaf.from] + gathered_[1][leaf.from]);
+    addTo(source[leaf.to], lightOf(passed));
+  }
   std::array<LeafSmoother::Light, 2> arriving;
   inBothHalves([&](std::size_t half) {
     for (auto end = leaves; end < source.size(); ++end) halves_[half].radiosity[end] = rounded(source[end]);

@@ -6,9 +6,10 @@
 // where r is the radiosity of each leaf that no shooter stands for, and of the sky, and R the mean over a leaf's rays.
 // So light comes
 // over links from whatever is worth an image of its own, and from all else by rays, and nothing comes twice: what
-// shooters send less than a leaf has, or more, is in r, signed. In rooms of hundreds of surfaces a ray to each sample
-// costs less than an image of all of them from each. Rays see leaves as they are, so that nothing varies within a
-// shooter, and what is near, or half hidden, needs no care of its own.
+// shooters send less than a leaf has, or more, is in r, signed. Translucent leaves send tau x of their other side, too.
+// In rooms of hundreds of surfaces a ray to each sample costs less than an image of all of them from each. Rays see
+// leaves as they are, so that nothing varies within a shooter, and what is near, or half hidden, needs no care of its
+// own.
 //
 // Solved by GMRES. What is sent and does not leave the scene arrives: of each part of the scene that sees nothing of
 // the others the level of x, which rays know to a thousandth or so, is the one that makes it so.
@@ -32,6 +33,7 @@
 
 #include "common/union_find.h"
 #include "server/solver/math/gmres.h"
+#include "server/solver/patches/passing.h"
 #include "server/solver/reflected/leaf_shading.h"
 #include "server/solver/reflected/leaf_sights.h"
 #include "server/solver/reflected/leaf_smoother.h"
@@ -44,6 +46,7 @@ namespace radiosity::solver {
 struct LeftLight {
   std::vector<glm::vec3> emission;  ///< of what is no light polygon
   std::vector<glm::vec3> reflectance;
+  std::vector<PassingLeaf> passing;                         ///< in their order
   std::shared_ptr<const SpecularLeaves> mirrors = nullptr;  ///< as of LeafGather::reflectBy()
   std::vector<glm::vec3> lamps;                             ///< emission of light polygons; empty: no mirror needs it
   std::array<std::vector<glm::vec3>, 2> irradiance;         ///< over links, by half
@@ -168,6 +171,7 @@ class LeafGather {
     std::vector<Light> source;       ///< r; by what may be seen (LeafSights::endCount)
     std::vector<Light32> radiosity;  ///< r + rho x; and then by step
     std::vector<Light32> arriving;   ///< its means
+    std::vector<Light32> passed;     ///< tau x of the other side, by leaf; empty: nothing is translucent
     /// By leaf: what its rays bring from the sky where its cells are told apart or mirrors show it; empty: they do not.
     std::vector<Light32> sky;
     std::vector<Light32> mirrored;  ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
@@ -191,6 +195,9 @@ class LeafGather {
     double area = 0.0;
   };
   void takeLight(std::size_t half);
+  void joinParts();
+  template <typename Arriving>
+  void passOn(std::size_t half, const Arriving& arriving);
   void takeSources(std::size_t half, std::span<SourceSum> sums) noexcept;
   [[nodiscard]] std::vector<bool> litSides(std::size_t half) const;
   [[nodiscard]] bool endsInLight(std::size_t half, std::uint32_t end, const std::vector<bool>& lit) const;
@@ -243,6 +250,10 @@ class LeafGather {
   void visitParted(std::size_t half, std::span<const std::uint32_t> leaves, const Visit& visit) const;
   void weighPartedLoss(std::size_t half);
   [[nodiscard]] Light sentFrom(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] double passedAt(std::size_t half, std::uint32_t value, std::size_t channel) const {
+    const auto& passed = halves_[half].passed;
+    return passed.empty() ? 0.0 : static_cast<double>(passed[value][channel]);
+  }
   /// It is parted, and some of its rays are lost.
   [[nodiscard]] bool losesApart(std::size_t half, std::uint32_t value) const {
     return has_parted_ && sights_.isParted(value) && lostOf(half, value).all() > 0.0;
@@ -329,8 +340,9 @@ class LeafGather {
   void addArrival(std::size_t half, const Arrival& ray, std::span<PartedFlux> fluxes) const;
   /// By half; none: not known, or these are many.
   std::array<std::optional<Parted>, 2> parted_;
-  std::array<LostRays, 2> lost_;     ///< by half; empty: none
-  std::vector<std::uint32_t> part_;  ///< by side: which part of the scene, whose number is that of a side
+  std::array<LostRays, 2> lost_;          ///< by half; empty: none
+  std::vector<std::uint32_t> part_;       ///< by side: which part of the scene, whose number is that of a side
+  std::vector<std::uint32_t> seen_part_;  ///< likewise, if nothing were translucent
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;

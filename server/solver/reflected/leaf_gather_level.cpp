@@ -36,9 +36,20 @@ void LeafGather::weighRays() {
   // Sides that see each other, if over others, are of one part, which has the number of the first of them.
   std::array<UnionFind, 2> parts{UnionFind(sides_.size()), UnionFind(sides_.size())};
   inBothHalves([&](std::size_t half) { weighRays(half, parts[half]); });
-  part_.resize(sides_.size());
+  seen_part_.resize(sides_.size());
   for (std::uint32_t s = 0; s < sides_.size(); ++s) parts[0].join(s, parts[1].find(s));
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = parts[0].find(s);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) seen_part_[s] = parts[0].find(s);
+}
+
+/// Light passes from one part of the scene to another through what is translucent, which makes them one.
+void LeafGather::joinParts() {
+  part_ = seen_part_;
+  if (light_.passing.empty()) return;
+  UnionFind parts(sides_.size());
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) parts.join(s, seen_part_[s]);
+  for (const auto& side : sides_)
+    if (!passingTo(light_.passing, side).empty()) parts.join(side.number, side.other);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = parts.find(s);
 }
 
 void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
@@ -133,7 +144,7 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
     const auto by = step.by;
     const auto reflectance = lightOf(light_.reflectance[by]);
     for (std::size_t c = 0; c < 3; ++c) {
-      sent[c] += part[c] * source[by][c];
+      sent[c] += part[c] * (source[by][c] + passedAt(h, by, c));
       part[c] *= reflectance[c];
     }
   }
@@ -141,7 +152,10 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
   const bool is_leaf = end < sights_.leafCount();
   const auto x = is_leaf ? solved(h, end) : Light{};
   const auto reflectance = is_leaf ? lightOf(light_.reflectance[end]) : Light{};
-  for (std::size_t c = 0; c < 3; ++c) sent[c] += part[c] * (source[end][c] + reflectance[c] * x[c]);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double passed = is_leaf ? passedAt(h, end, c) : 0.0;
+    sent[c] += part[c] * (source[end][c] + reflectance[c] * x[c] + passed);
+  }
   return sent;
 }
 
@@ -229,6 +243,17 @@ LeafGather::Levels LeafGather::levels(std::size_t h) {
 
 /// What shooters leave to each leaf.
 RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum> sums) noexcept {
+  auto& sources = halves_[h].source;  // all 0
+  for (const auto& leaf : light_.passing) {
+    const double area = areaOf(leaf.to), sends = 1.0 - lostOf(h, leaf.to).all() - atGlass(h, leaf.to);
+    const auto mirrored = mirroredAt(h, leaf.to);
+    const auto over_links = lightOf(light_.irradiance[h][leaf.from]), part = lightOf(leaf.transmittance);
+    auto& sum = sums[part_[sights_.sideOf(leaf.to)]];
+    for (std::size_t c = 0; c < 3; ++c) {
+      sources[leaf.to][c] = part[c] * over_links[c];
+      sum.takes[c] -= area * (sends + mirrored[c]) * part[c];
+    }
+  }
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     SourceSum sum;
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
@@ -242,7 +267,7 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
       const auto mirrored = mirroredAt(h, v), only_in_mirrors = shotOf(h, v);
       auto& source = halves_[h].source[v];
       for (std::size_t c = 0; c < 4; ++c) {
-        source[c] = emission[c] + reflectance[c] * over_links[c] - shot[c];
+        source[c] += emission[c] + reflectance[c] * over_links[c] - shot[c];
         const double in_mirrors = mirrored[c] * only_in_mirrors[c];
         sum.shining[c] += area * (std::abs(source[c]) + taken * sky[c] + std::abs(in_mirrors));
         sum.arrives[c] += area * ((sends + mirrored[c]) * source[c] + taken * sky[c] + in_mirrors);
@@ -289,7 +314,8 @@ std::vector<bool> LeafGather::litSides(std::size_t half) const {
     spreads = false;
     for (std::uint32_t s = 0; s < sides_.size(); ++s) {
       if (lit[s]) continue;
-      lit[s] = anyLeaf(s, seesLight);
+      const bool shines_through = !passingTo(light_.passing, sides_[s]).empty() && lit[sides_[s].other];
+      lit[s] = shines_through || anyLeaf(s, seesLight);
       spreads = spreads || lit[s];
     }
   }
@@ -329,6 +355,22 @@ void LeafGather::LevelSum::add(const LevelSum& other) {
 
 /// By part of the scene.
 RADIOSITY_CLONES void LeafGather::addLevels(std::size_t h, std::span<LevelSum> sums) const noexcept {
+  for (const auto& leaf : light_.passing) {
+    const double area = areaOf(leaf.to);
+    const auto x = solved(h, leaf.from), over_links = lightOf(light_.irradiance[h][leaf.from]);
+    const auto& loss = lossOf(h, leaf.to);
+    const auto mirrored = mirroredAt(h, leaf.to);
+    const double lost = lostOf(h, leaf.to).all(), at_glass = atGlass(h, leaf.to);
+    auto& sum = sums[part_[sights_.sideOf(leaf.to)]];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double sends = 1.0 - loss[c] * lost - at_glass + mirrored[c];
+      const double goes = area * sends * static_cast<double>(leaf.transmittance[static_cast<int>(c)]);
+      sum.kept[c] -= goes * x[c];
+      sum.size[c] -= goes * std::abs(x[c]);
+      sum.all[c] -= goes * (x[c] + over_links[c]);
+      sum.stays[c] -= goes;
+    }
+  }
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     LevelSum sum;
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
@@ -379,6 +421,10 @@ RADIOSITY_CLONES void LeafGather::take(std::size_t h, const Levels& levels) noex
       }
       gathered[v] = glm::vec3(arrives[0], arrives[1], arrives[2]);
     }
+  }
+  for (const auto& leaf : light_.passing) {
+    const auto passed = leaf.of(gathered);
+    for (std::size_t c = 0; c < 3; ++c) halves_[h].radiosity[leaf.to][c] += passed[static_cast<int>(c)];
   }
 }
 

@@ -58,6 +58,7 @@ std::vector<LeafGather::Light32> LeafGather::reflectedOf(std::size_t half, const
 /// followSteps() where some steps are of mirrors.
 void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* source) {
   auto& radiosity = halves_[half].radiosity;
+  const auto& passed = halves_[half].passed;
   auto to = radiosity.begin() + sights_.endCount();
   for (const auto& step : sights_.steps(half)) {
     auto& light = *to++;
@@ -65,7 +66,8 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
     if (!SpecularStep::is(step.by)) {
       const auto& reflectance = light_.reflectance[step.by];
       for (std::size_t c = 0; c < 3; ++c) {
-        const float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+        float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+        if (!passed.empty()) own += passed[step.by][c];
         light[c] = reflectance[static_cast<int>(c)] * next[c] + own;
       }
       continue;

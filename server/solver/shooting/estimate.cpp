@@ -36,6 +36,8 @@ double meanReflectance(const RadiosityState& state) {
       const glm::vec3 h = state.irradiance(side, leaf) * state.leafArea(side, leaf);
       received += static_cast<double>(h.x + h.y + h.z);
       reflected += static_cast<double>(glm::dot(h, state.reflectance(side, leaf)));
+      const glm::vec3 passed = state.passed(side, leaf) * state.leafArea(side, leaf);
+      reflected += static_cast<double>(passed.x + passed.y + passed.z);
     }
   }
   return received > 0.0 ? std::clamp(reflected / received, 0.0, 0.999) : 0.0;
@@ -86,6 +88,7 @@ EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 
         parts.emitted[i] += area * static_cast<double>(state.emission(side, leaf)[c]);
         parts.absorbed[i] += area * (1.0 - static_cast<double>(state.reflectance(side, leaf)[c])) *
                              static_cast<double>(state.irradiance(side, leaf)[c]);
+        parts.absorbed[i] -= area * static_cast<double>(state.passed(side, leaf)[c]);  // as the other side says
         parts.unshot[i] += area * static_cast<double>(state.unshot(side, leaf)[c]) / rounds;
         if (side.gathered) parts.unshot[i] += area * static_cast<double>(state.emission(side, leaf)[c]);
       }

@@ -40,6 +40,7 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
 void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {
   emission_ = materials.emission;
   reflectance_ = materials.reflectance;
+  transmittance_ = materials.transmittance;
   for (auto& side : sides_) {
     side.mean_reflectance = channelSum(reflectance_.side(side.number)[side.node_count - 1]) / 3.0F;
     side.dirty = true;
@@ -97,6 +98,12 @@ void RadiosityState::receive(const FluxAccumulators& batch) {
     if (arrived > 0.0) {
       side.dirty = true;
       side.unshot_power += arrived / flux_scale_ * static_cast<double>(side.mean_reflectance);
+      if (side.other != scene::kNone && transmittance_.sideCount() > 0) {
+        auto& other = sides_[side.other];
+        const auto passing = channelSum(transmittance_.side(other.number)[other.node_count - 1]) / 3.0F;
+        other.dirty = other.dirty || passing > 0.0F;
+        other.unshot_power += arrived / flux_scale_ * static_cast<double>(passing);
+      }
     }
   }
   addTo(escaped_, batch.escaped);
@@ -106,7 +113,7 @@ void RadiosityState::receive(const FluxAccumulators& batch) {
 }
 
 glm::vec3 RadiosityState::scatterRadiosity(const Side& side, std::uint32_t leaf) const {
-  const glm::vec3 reflected = reflectance(side, leaf) * irradiance(side, leaf);
+  const glm::vec3 reflected = reflectance(side, leaf) * irradiance(side, leaf) + passed(side, leaf);
   return side.gathered ? reflected : emission(side, leaf) + reflected;
 }
 
@@ -134,17 +141,28 @@ void RadiosityState::pushHalf(const Side& side, std::uint32_t half, std::vector<
   }
 }
 
-void RadiosityState::pushPull(Side& side) {
-  if (!side.dirty) return;
+/// Irradiance of the leaves.
+void RadiosityState::push(const Side& side) {
   thread_local std::vector<glm::dvec3> first, second;
   pushHalf(side, 0, first);
   pushHalf(side, 1, second);
   const double unit = 1.0 / (flux_scale_ * static_cast<double>(rounds_));
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const bool empty = leafArea(side, leaf) <= 0.0F;
+    irradiance_[side.first_value + leaf] = empty ? glm::vec3(0.0F) : glm::vec3((first[leaf] + second[leaf]) * unit);
+  }
+}
+
+void RadiosityState::pushPull(Side& side) {
+  if (!side.dirty) return;
+  push(side);
+  // What arrives on the other side makes this one dirty, too. The other stays so until its own turn.
+  if (side.other != scene::kNone && transmittance_.sideCount() > 0 && sides_[side.other].dirty)
+    push(sides_[side.other]);
   const auto rounds = static_cast<float>(rounds_);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const std::uint32_t v = side.first_value + leaf;
     const bool empty = leafArea(side, leaf) <= 0.0F;
-    irradiance_[v] = empty ? glm::vec3(0.0F) : glm::vec3((first[leaf] + second[leaf]) * unit);
     unshot_[v] = empty ? glm::vec3(0.0F) : rounds * scatterRadiosity(side, leaf) - shot_[v];
   }
   pull(side);

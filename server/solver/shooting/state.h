@@ -1,8 +1,8 @@
 // The state of a solve: what every node has received (H, as integers) and what every leaf has shot (S). Radiosity and
 // unshot radiosity are derived, never accumulated, so that nothing drifts:
 //
-//   B = E + rho H,   H = received / (rounds area),   unshot = rounds B' - S,   B' = the part of B that scatter shots
-//   carry.
+//   B = E + rho H + tau H of the other side,   H = received / (rounds area),   unshot = rounds B' - S,   B' = the part
+//   of B that scatter shots carry.
 //
 // Rounds: the first shoots until little is left; each further round adds one to `rounds`, which makes the whole B
 // unshot once more, to be shot with fresh samples. H is thereby the mean over rounds, and what a round left over is
@@ -91,6 +91,11 @@ class RadiosityState {
   [[nodiscard]] glm::vec3 reflectance(const Side& side, std::uint32_t leaf) const {
     return reflectance_.side(side.number)[leaf];
   }
+  /// Radiosity that leaves there since light arrives on the other side. Needs pushPull() of the side.
+  [[nodiscard]] glm::vec3 passed(const Side& side, std::uint32_t leaf) const {
+    if (side.other == scene::kNone || transmittance_.sideCount() == 0) return glm::vec3(0.0F);
+    return transmittance_.side(side.number)[leaf] * irradiance(sides_[side.other], leaf);
+  }
   [[nodiscard]] float leafArea(const Side& side, std::uint32_t leaf) const {
     return patches_->node_area[side.first_node + leaf];
   }
@@ -117,11 +122,12 @@ class RadiosityState {
   void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   void pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   [[nodiscard]] glm::vec3 scatterRadiosity(const Side& side, std::uint32_t leaf) const;
+  void push(const Side& side);
   void pushHalf(const Side& side, std::uint32_t half, std::vector<glm::dvec3>& density) const;
 
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Side> sides_;
-  scene::SideColours emission_, reflectance_;
+  scene::SideColours emission_, reflectance_, transmittance_;
   std::array<std::vector<Flux3>, 2> received_;  // by node, H as integers, unpushed
   std::vector<glm::vec3> shot_;                 // by leaf value: S, summed over rounds
   std::vector<std::uint8_t> shot_level_;        // by leaf value

@@ -68,6 +68,7 @@ PlaceLight::PlaceLight(const SolvedScene& solved)
     }
   }
   takeMirrors(solved.materials);
+  passing_ = passingLeaves(solved.materials.transmittance, *sides_, leafAreas(patches_, *sides_));
   setIrradiance(solved.irradiance, solved.difference);
 }
 
@@ -113,6 +114,14 @@ void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<
       // Of the mean of two, half of what they differ by.
       if (!off_.empty()) off_[value] = 0.5F * reflectance_[value] * difference[side.first_node + leaf];
     }
+  }
+  passed_.assign(passing_.empty() ? 0 : radiosity_.size(), glm::vec3(0.0F));
+  for (const auto& leaf : passing_) {
+    const auto& side = (*sides_)[rays_->sideOf(leaf.from).number];
+    const auto node = side.first_node + leaf.from - side.first_value;
+    passed_[leaf.to] = leaf.transmittance * irradiance[node];
+    radiosity_[leaf.to] += passed_[leaf.to];
+    if (!off_.empty()) off_[leaf.to] += 0.5F * leaf.transmittance * difference[node];
   }
 }
 
@@ -218,7 +227,8 @@ glm::dvec3 PlaceLight::leaving(std::uint32_t value, const LeafRays::Place& end, 
   if (steps == 0 || value != end.value || !rays_->isCut(value) || is_mirror) return glm::dvec3(radiosity_[value]);
   const Spot there{end, end.normal, {}};
   const auto arrives = direct(there, mixKeys(key, 3), Looks::kFewer) + reflectedBy(there, mixKeys(key, 4), steps - 1);
-  return glm::dvec3(emission_[value]) + glm::dvec3(reflectance_[value]) * arrives;
+  const auto passed = passed_.empty() ? glm::vec3(0.0F) : passed_[value];
+  return glm::dvec3(emission_[value] + passed) + glm::dvec3(reflectance_[value]) * arrives;
 }
 
 glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key, Looks looks) const {

@@ -18,6 +18,7 @@
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/lamps/sky_sources.h"
 #include "server/solver/patches/lights.h"
+#include "server/solver/patches/passing.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
 
@@ -76,6 +77,7 @@ class PlaceLight {
   [[nodiscard]] glm::dvec3 skyAt(std::uint32_t cell) const { return sky_->at(cell); }
   /// By leaf value.
   [[nodiscard]] const std::vector<glm::vec3>& reflectance() const { return reflectance_; }
+  [[nodiscard]] const std::vector<PassingLeaf>& passing() const { return passing_; }
 
   [[nodiscard]] const std::vector<Side>& sides() const { return *sides_; }
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
@@ -123,7 +125,9 @@ class PlaceLight {
   std::optional<SkyLight> sky_;
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
-  std::vector<glm::vec3> off_;                     ///< what radiosity_ is off by; empty: not known
+  std::vector<PassingLeaf> passing_;
+  std::vector<glm::vec3> passed_;  ///< of radiosity_, what came through translucent leaves; empty: nothing does
+  std::vector<glm::vec3> off_;     ///< what radiosity_ is off by; empty: not known
   std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
   std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
 };

@@ -36,7 +36,8 @@ struct LeafLight {
   std::span<const PunctualLights::Source> sources;
   /// Null: reflected light does not come by rays, which know what varies where a leaf is parted.
   const LeafSights* sights = nullptr;
-  const SkyLight* sky = nullptr;  ///< null: black
+  const SkyLight* sky = nullptr;                          ///< null: black
+  std::array<std::span<const glm::vec3>, 2> passed = {};  ///< through translucent leaves, lm/m^2; empty: nothing does
 };
 
 class LeafVariation {

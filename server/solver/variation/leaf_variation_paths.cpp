@@ -245,7 +245,8 @@ LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& li
     if (value == LeafRays::kNothing) return glm::vec3(0.0F);
     if (value >= LeafRays::kSky)
       return light.sky != nullptr ? glm::vec3(light.sky->at(value - LeafRays::kSky)) : glm::vec3(0.0F);
-    return light.reflectance[value] * light.irradiance[half][value] + light.emission[value];
+    const auto own = light.reflectance[value] * light.irradiance[half][value] + light.emission[value];
+    return light.passed[half].empty() ? own : own + light.passed[half][value];
   };
   glm::vec3 direct(0.0F);
   if (path.light_factor != 0.0F) direct += path.light_factor * light.lights[path.light].emission;

@@ -18,6 +18,20 @@ std::int64_t wholeFlux(double flux) {
   return std::llround(std::isfinite(flux) ? std::clamp(flux, -kMost, kMost) : kMost);
 }
 
+/// Of one side.
+void addNodes(const Quad& quad, const scene::Surface& surface, scene::PatchScene& patches) {
+  for (std::uint32_t level = 0; level < surface.level_count; ++level) {
+    const auto grid = scene::levelGrid(quad.width, quad.height, level);
+    for (std::uint32_t y = 0; y < grid.height; ++y) {
+      for (std::uint32_t x = 0; x < grid.width; ++x) {
+        const auto leaves = (std::min((x + 1) << level, quad.width) - (x << level)) *
+                            (std::min((y + 1) << level, quad.height) - (y << level));
+        patches.node_area.push_back(surface.texel_area * static_cast<float>(leaves));
+      }
+    }
+  }
+}
+
 void addQuad(const Quad& quad, QuadScene& out) {
   auto& patches = *out.patches;
   const auto s = static_cast<std::uint32_t>(patches.surfaces.size());
@@ -48,15 +62,10 @@ void addQuad(const Quad& quad, QuadScene& out) {
         {glm::vec2(static_cast<float>(leaf % quad.width) + 0.5F, static_cast<float>(leaf / quad.width) + 0.5F),
          surface.first_triangle, true});
   }
-  for (std::uint32_t level = 0; level < surface.level_count; ++level) {
-    const auto grid = scene::levelGrid(quad.width, quad.height, level);
-    for (std::uint32_t y = 0; y < grid.height; ++y) {
-      for (std::uint32_t x = 0; x < grid.width; ++x) {
-        const auto leaves = (std::min((x + 1) << level, quad.width) - (x << level)) *
-                            (std::min((y + 1) << level, quad.height) - (y << level));
-        patches.node_area.push_back(surface.texel_area * static_cast<float>(leaves));
-      }
-    }
+  addNodes(quad, surface, patches);
+  if (quad.transmittance != glm::vec3(0.0F)) {
+    surface.first_node[1] = static_cast<std::uint32_t>(patches.node_area.size());
+    addNodes(quad, surface, patches);
   }
   patches.surfaces.push_back(surface);
 }
@@ -74,14 +83,36 @@ glm::vec3 cosineDirection(const solver::HemicubeFrame& frame, const glm::dvec4& 
 
 }  // namespace
 
+namespace {
+
+struct LitSide {
+  const scene::Surface& surface;
+  std::size_t face;
+};
+std::vector<LitSide> litSides(const scene::PatchScene& patches) {
+  std::vector<LitSide> sides;
+  for (const auto& surface : patches.surfaces)
+    for (std::size_t face = 0; face < 2; ++face)
+      if (surface.first_node[face] != scene::kNone) sides.push_back({surface, face});
+  return sides;
+}
+
+}  // namespace
+
 QuadScene makeQuadScene(const std::vector<Quad>& quads) {
   QuadScene out;
   out.patches = std::make_shared<scene::PatchScene>();
   for (const auto& quad : quads) addQuad(quad, out);
   out.materials.emission = out.materials.reflectance = scene::SideColours(*out.patches);
-  for (std::size_t q = 0; q < quads.size(); ++q) {
-    out.materials.emission.fill(q, quads[q].emission);
-    out.materials.reflectance.fill(q, quads[q].reflectance);
+  const auto lets_through = [](const Quad& quad) { return quad.transmittance != glm::vec3(0.0F); };
+  if (std::ranges::any_of(quads, lets_through)) out.materials.transmittance = scene::SideColours(*out.patches);
+  std::size_t side = 0;
+  for (const auto& quad : quads) {
+    for (const auto end = side + (lets_through(quad) ? 2 : 1); side < end; ++side) {
+      out.materials.emission.fill(side, quad.emission);
+      out.materials.reflectance.fill(side, quad.reflectance);
+      if (lets_through(quad)) out.materials.transmittance.fill(side, quad.transmittance);
+    }
   }
   return out;
 }
@@ -126,6 +157,15 @@ RayTransport::Hit RayTransport::cast(const glm::vec3& origin, const glm::vec3& d
   return nearest;
 }
 
+/// Of the side that it is on; kNone: it has no leaves, or nothing was hit.
+std::uint32_t RayTransport::nodeOf(const Hit& hit) const {
+  if (hit.surface == scene::kNone) return scene::kNone;
+  const auto& surface = patches_->surfaces[hit.surface];
+  const auto first = surface.first_node[hit.front ? 0 : 1];
+  if (first == scene::kNone) return first;
+  return first + static_cast<std::uint32_t>(hit.texel.y) * surface.width + static_cast<std::uint32_t>(hit.texel.x);
+}
+
 void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const {
   const auto key = solver::mixKeys(static_cast<std::uint64_t>(static_cast<std::int64_t>(shot.frame.origin.x * 1e6F)),
                                    static_cast<std::uint64_t>(static_cast<std::int64_t>(shot.frame.origin.y * 1e6F)));
@@ -135,16 +175,13 @@ void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver
     const Hit hit = cast(shot.frame.origin, d);
     solver::Flux3 flux{};
     for (std::size_t c = 0; c < 3; ++c) flux[c] = std::llround(shot.flux[c] * scale / rays_);
-    auto& target =
-        hit.surface == scene::kNone ? into.escaped
-        : !hit.front
-            ? into.backface
-            : into.node[shot.half][patches_->surfaces[hit.surface].first_node[0] +
-                                   static_cast<std::uint32_t>(hit.texel.y) * patches_->surfaces[hit.surface].width +
-                                   static_cast<std::uint32_t>(hit.texel.x)];
+    const auto node = nodeOf(hit);
+    auto& target = hit.surface == scene::kNone ? into.escaped
+                   : node == scene::kNone      ? into.backface
+                                               : into.node[shot.half][node];
     for (std::size_t c = 0; c < 3; ++c) {
       target[c] += flux[c];
-      if (hit.surface != scene::kNone && hit.front) into.scattered[c] += flux[c];
+      if (node != scene::kNone) into.scattered[c] += flux[c];
     }
   }
 }
@@ -156,7 +193,7 @@ void RayTransport::countLost(const solver::GatherShot& shot, const solver::ShotB
     const auto& point = batch.points[shot.first_point + k];
     for (std::uint32_t i = 0; i < rays_; ++i) {
       const Hit hit = cast(point.origin, cosineDirection(point, solver::sobol4(i, k)));
-      if (hit.surface != scene::kNone && hit.front) continue;
+      if (nodeOf(hit) != scene::kNone) continue;
       auto& target = hit.surface == scene::kNone ? into.escaped : into.backface;
       for (std::size_t c = 0; c < 3; ++c) {
         target[c] += std::llround(shot.radiosity[c] * light_area * batch.flux_scale / (rays_ * shot.point_count));
@@ -172,8 +209,9 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
     cross += glm::cross(shot.corners[k] - shot.corners[0], shot.corners[k + 1] - shot.corners[0]);
   const double light_area = 0.5 * static_cast<double>(glm::length(cross));
   countLost(shot, batch, light_area, into);
-  for (const auto& surface : patches_->surfaces) {
+  for (const auto& [surface, face] : litSides(*patches_)) {
     const auto& frame = patches_->triangles[surface.first_triangle];
+    const glm::vec3 normal = face == 0 ? frame.normal : -frame.normal;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const glm::vec2 texel(static_cast<float>(leaf % surface.width) + 0.5F,
                             static_cast<float>(leaf / surface.width) + 0.5F);
@@ -182,12 +220,12 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
       for (std::uint32_t k = 0; k < shot.point_count; ++k) {
         const glm::vec3 to = batch.points[shot.first_point + k].origin - p;
         const float distance = glm::length(to);
-        const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
+        const float cosines = std::max(0.0F, glm::dot(to, normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
         if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
         factor[2 * k >= shot.point_count ? 1 : 0] +=
             static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area / std::numbers::pi;
       }
-      const auto node = surface.first_node[0] + leaf;
+      const auto node = surface.first_node[face] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {
         const double share = static_cast<double>(patches_->node_area[node]) * batch.flux_scale;
         if (shot.half != solver::kBothHalves) {
@@ -210,13 +248,14 @@ template <typename Irradiance>
 void RayTransport::light(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, std::uint32_t half,
                          double scale, Irradiance irradiance, solver::FluxAccumulators& into) const {
   std::array<double, 3> caught{};
-  for (const auto& surface : patches_->surfaces) {
+  for (const auto& [surface, face] : litSides(*patches_)) {
     const auto& frame = patches_->triangles[surface.first_triangle];
+    const glm::vec3 normal = face == 0 ? frame.normal : -frame.normal;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const glm::vec2 texel(static_cast<float>(leaf % surface.width) + 0.5F,
                             static_cast<float>(leaf / surface.width) + 0.5F);
-      const double e = irradiance(frame.origin + texel.x * frame.du + texel.y * frame.dv, frame.normal);
-      const auto node = surface.first_node[0] + leaf;
+      const double e = irradiance(frame.origin + texel.x * frame.du + texel.y * frame.dv, normal);
+      const auto node = surface.first_node[face] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = unit[c] * e * static_cast<double>(patches_->node_area[node]);
         into.node[half][node][c] += std::llround(flux * scale);

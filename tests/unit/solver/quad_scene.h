@@ -16,6 +16,7 @@ struct Quad {
   glm::vec3 origin, du, dv;  // corners origin, +du, +du+dv, +dv; front = du x dv
   std::uint32_t width = 8, height = 8;
   glm::vec3 emission{0.0F}, reflectance{0.0F};
+  glm::vec3 transmittance{0.0F};  ///< not black: both sides have leaves, and emit and reflect alike
 };
 
 struct QuadScene {
@@ -54,6 +55,7 @@ class RayTransport final : public solver::Transport {
     glm::vec2 texel{0.0F};
     float distance = 0.0F;
   };
+  [[nodiscard]] std::uint32_t nodeOf(const Hit& hit) const;
   [[nodiscard]] Hit cast(const glm::vec3& origin, const glm::vec3& direction) const;
   void scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const;
   void gather(const solver::GatherShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;

@@ -6,6 +6,7 @@ import type { SceneDocument } from '../document/scene_document';
 import type { Server } from '../protocol/connection';
 import { NOT_FOUND, type PastRevision, type Resume, type SceneHistory } from '../protocol/messages';
 import { ConnectionLost, RpcError } from '../protocol/rpc';
+import { sendable } from '../textures/sendable';
 import type { Notes } from '../ui/toast';
 import { loadNote, wasReplaced } from './load_note';
 
@@ -101,7 +102,10 @@ export class SceneSession<Placed> {
     const placed = this.upload?.placed ?? camera.forgetCamera();
     const upload: Upload<Placed> = (this.upload = { abort: new AbortController(), placed, asked: false });
     try {
-      const url = await this.send(file, upload.abort.signal);
+      const { signal } = upload.abort;
+      const sent = await sendable(file, () => notes.show(`Unpacking the textures of ${file.name}…`), signal);
+      if (sent.size > limit) throw new Error('its unpacked textures make it larger than the server accepts');
+      const url = await this.send(sent, signal);
       // The calls go over one connection, so scenes are loaded in the order in which the user chose them.
       if (upload !== this.upload) return;
       upload.asked = true;

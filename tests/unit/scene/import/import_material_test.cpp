@@ -42,6 +42,26 @@ TEST(ImportMaterial, materialsCarryWhatLightNeeds) {
   EXPECT_THAT(builder.scene()->warnings, Contains(HasSubstr("/materials/0/emissiveFactor")));
 }
 
+TEST(ImportMaterial, whatTransmitsDiffuselyHasTwoSides) {
+  GltfBuilder builder;
+  const Json leaf{{"diffuseTransmissionFactor", 0.25}, {"diffuseTransmissionColorFactor", {1.0, 0.5, 0.25}}};
+  builder.gltf["extensionsRequired"] = builder.gltf["extensionsUsed"] = {"KHR_materials_diffuse_transmission"};
+  builder.gltf["materials"] = Json::array(
+      {{{"emissiveFactor", {1, 1, 1}},
+        {"extensions",
+         {{"KHR_materials_diffuse_transmission", leaf}, {"KHR_materials_volume", {{"thicknessFactor", 0.1}}}}}},
+       {{"extensions", {{"KHR_materials_diffuse_transmission", Json::object()}}}}});
+  const auto materials = imported(builder).materials;
+  EXPECT_EQ(materials.at(0).diffuse_transmission, 0.25F);
+  EXPECT_EQ(materials.at(0).diffuse_transmission_color, glm::vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_TRUE(materials.at(0).double_sided);
+  EXPECT_FALSE(materials.at(1).isTranslucent());
+  EXPECT_FALSE(materials.at(1).double_sided);
+  const auto warnings = builder.scene()->warnings;
+  EXPECT_THAT(warnings, Contains(HasSubstr("emits from both")));
+  EXPECT_THAT(warnings, Contains(HasSubstr("thin sheets")));
+}
+
 TEST(ImportMaterial, metalIsGltfsDefault) {
   GltfBuilder builder;
   builder.gltf["materials"] = Json::array({{{"name", "foil"}}});

@@ -122,6 +122,48 @@ TEST(Shade, WhatGlassReflectsAndPassesIsToldByItsInterface) {
               1e-3F);
 }
 
+// The metal's part of the light is neither reflected diffusely nor let through; alpha of the texture says how much
+// passes.
+TEST(Shade, TranslucentSurfacesShareTheirLightBetweenBothSides) {
+  Scene scene;
+  Texture half = textureOf(1, 1, {51}, true);
+  half.rgba[3] = 102;  // of 255: 0.4
+  scene.textures.push_back(half);
+  Primitive floor = floorQuad(1.0);
+  floor.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material leaf;
+  leaf.base_color = {0.2F, 0.4F, 0.6F};
+  leaf.metallic = 0.25F;
+  leaf.double_sided = true;
+  leaf.diffuse_transmission = 0.5F;
+  leaf.diffuse_transmission_color = {1.0F, 0.5F, 0.25F};
+  leaf.diffuse_transmission_texture.texture = 0;
+  place(scene, floor, glm::dmat4(1.0), leaf);
+  const PatchScene patches = build(scene, 100);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  ASSERT_EQ(patches.surfaces.size(), 1U);
+  for (const auto first : patches.surfaces[0].first_node) {
+    ASSERT_NE(first, kNone) << "both sides have patches, in the dark, too";
+    EXPECT_NEAR(materials.base_reflectance[first].y, 0.75 * 0.4, 1e-6);
+    EXPECT_NEAR(materials.reflectance[first].y, 0.75 * 0.4 * 0.8, 1e-6);
+    EXPECT_NEAR(materials.transmittance[first].y, 0.75 * 0.5 * 0.2, 1e-6);
+  }
+}
+
+TEST(Shade, ReflectanceAndTransmittanceAreLoweredTogether) {
+  Scene scene;
+  Material paper;
+  paper.double_sided = true;
+  paper.diffuse_transmission = 0.25F;
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), paper);
+  const PatchScene patches = build(scene, 10);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  EXPECT_NEAR(materials.reflectance[0].x, 0.75 * 0.999, 1e-6);
+  EXPECT_NEAR(materials.transmittance[0].x, 0.25 * 0.999, 1e-6);
+  EXPECT_THAT(materials.warnings, testing::ElementsAre(testing::HasSubstr("reflectance and transmittance")));
+  EXPECT_EQ(shadePatches(sceneOf(floorQuad(1.0)), patches).transmittance.sideCount(), 0U) << "nothing is translucent";
+}
+
 TEST(Shade, ReflectanceOfOneIsLoweredWithAWarning) {
   const Scene scene = sceneOf(floorQuad(1.0));
   const PatchScene patches = build(scene, 10);

@@ -1,0 +1,169 @@
+#include "client/cli/ktx2.h"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "client/cli/scene_file.h"
+#include "client/cli/transcoder_files.h"
+
+namespace radiosity::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kExtension = "KHR_texture_basisu";
+constexpr int kNoProgram = 127;
+constexpr std::size_t kMostText = 4096;
+
+struct Folder {
+  explicit Folder(std::string name) : path(std::move(name)) {}
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  fs::path path;
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+};
+
+Result<std::shared_ptr<const Folder>> makeFolder() {
+  std::error_code error;
+  auto name = (fs::temp_directory_path(error) / "radiosity-ktx2-XXXXXX").string();
+  if (error || mkdtemp(name.data()) == nullptr)
+    return fail(ErrorCode::kUnavailable, std::string("cannot be made: ") + std::strerror(errno), name);
+  return std::make_shared<const Folder>(std::move(name));
+}
+
+Result<void> write(const fs::path& path, std::string_view bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (file) return {};
+  return fail(ErrorCode::kUnavailable, std::string("cannot be written: ") + std::strerror(errno), path.string());
+}
+
+/// Runs in the child, between fork and exec: only async-signal-safe calls.
+[[noreturn]] void become(const std::vector<char*>& arguments, int errors) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) signal(number, SIG_DFL);
+  dup2(errors, STDERR_FILENO);
+  dup2(errors, STDOUT_FILENO);
+  execvp(arguments[0], arguments.data());
+  _exit(kNoProgram);
+}
+
+struct Ran {
+  int exit_code = 0;  ///< 128 + signal where one ended it
+  std::string text;   ///< the first of what it printed
+};
+
+Result<Ran> run(std::vector<std::string> command) {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) return fail(ErrorCode::kUnavailable, std::string("pipe: ") + strerror(errno));
+  std::vector<char*> arguments;
+  for (auto& word : command) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) become(arguments, ends[1]);
+  close(ends[1]);
+  if (child < 0) {
+    close(ends[0]);
+    return fail(ErrorCode::kUnavailable, std::string("fork: ") + strerror(errno));
+  }
+  Ran ran;
+  std::array<char, 1024> part{};
+  for (;;) {
+    const auto count = read(ends[0], part.data(), part.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    const auto room = kMostText - std::min(kMostText, ran.text.size());
+    ran.text.append(part.data(), std::min(room, static_cast<std::size_t>(count)));
+  }
+  close(ends[0]);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
+  ran.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  while (!ran.text.empty() && ran.text.back() == '\n') ran.text.pop_back();
+  return ran;
+}
+
+/// What the script says of its input is of the user's file.
+Result<void> transcode(const fs::path& folder, const std::string& from, const std::string& to,
+                       const std::string& path) {
+  const auto files = transcoderFiles();
+  if (files.script.empty())
+    return fail(ErrorCode::kUnsupported,
+                "has KTX2 textures, and this program was built without the npm packages that unpack them; export PNG, "
+                "JPEG or WebP",
+                path);
+  const auto script = folder / "transcode.mjs", basis = folder / "basis.js", wasm = folder / "basis.wasm";
+  for (const auto& [file, bytes] :
+       {std::pair(script, files.script), std::pair(basis, files.basis_script), std::pair(wasm, files.basis_wasm)})
+    if (auto written = write(file, bytes); !written) return written;
+  const auto ran = run({"node", script.string(), basis.string(), wasm.string(), from, to});
+  if (!ran) return tl::unexpected(ran.error());
+  if (ran->exit_code == kNoProgram)
+    return fail(ErrorCode::kUnsupported,
+                "has KTX2 textures, which node unpacks, and node was not found: install it (Debian: nodejs), drop the "
+                "file on the viewer, or export PNG, JPEG or WebP",
+                path);
+  if (ran->exit_code != 0) return fail(ErrorCode::kBadInput, ran->text.empty() ? "node failed" : ran->text, path);
+  return {};
+}
+
+}  // namespace
+
+bool mayHaveKtx2(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 20> head{};
+  file.read(head.data(), head.size());
+  std::string text(head.data(), static_cast<std::size_t>(file.gcount()));
+  if (text.starts_with("glTF")) {  // only of the JSON, which comes first
+    if (text.size() < head.size()) return false;
+    std::uint32_t bytes = 0;
+    std::memcpy(&bytes, head.data() + 12, sizeof bytes);
+    std::error_code error;
+    const auto size = fs::file_size(path, error);
+    if (error || bytes > size) return false;
+    text.resize(bytes);
+    file.read(text.data(), bytes);
+  } else {
+    text.append(std::istreambuf_iterator<char>(file), {});
+  }
+  return text.find(kExtension) != std::string::npos;
+}
+
+Result<SceneToSend> withoutKtx2(const std::string& path) {
+  SceneToSend scene(path);
+  if (!mayHaveKtx2(path)) return scene;
+  const auto kind = sceneKind(path);
+  if (!kind) return tl::unexpected(kind.error());
+  const auto folder = makeFolder();
+  if (!folder) return tl::unexpected(folder.error());
+  auto from = path;
+  if (*kind == SceneKind::kGltf) {
+    const auto text = inlineExternalFiles(path);
+    if (!text) return tl::unexpected(text.error());
+    from = ((*folder)->path / "scene.gltf").string();
+    if (auto written = write(from, *text); !written) return tl::unexpected(written.error());
+  }
+  const auto to = (*folder)->path / (*kind == SceneKind::kGlb ? "sent.glb" : "sent.gltf");
+  if (auto done = transcode((*folder)->path, from, to.string(), path); !done) return tl::unexpected(done.error());
+  scene.path_ = to.string();
+  scene.folder_ = *folder;
+  return scene;
+}
+
+}  // namespace radiosity::cli
