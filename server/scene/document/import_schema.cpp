@@ -232,8 +232,8 @@ constexpr Member kMaterial[] = {string("name"),
                                 object("extensions", kMaterialExtensions)};
 
 constexpr Member kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", Ref::kBufferViews)};
-constexpr Member kWebp[] = {index("source", Ref::kImages)};
-constexpr Member kTextureExtensions[] = {object("EXT_texture_webp", kWebp)};
+constexpr Member kPicture[] = {index("source", Ref::kImages)};
+constexpr Member kTextureExtensions[] = {object("EXT_texture_webp", kPicture), object("KHR_texture_basisu", kPicture)};
 constexpr Member kTexture[] = {string("name"), looseIndex("sampler", Ref::kSamplers),
                                looseIndex("source", Ref::kImages), object("extensions", kTextureExtensions)};
 constexpr Member kSampler[] = {string("name"), uint("magFilter"), uint("minFilter"), uint("wrapS"), uint("wrapT")};

@@ -17,6 +17,7 @@ constexpr std::string_view kSupported[] = {"EXT_lights_area",
                                            "KHR_draco_mesh_compression",
                                            "KHR_environment_map",
                                            "KHR_lights_punctual",
+                                           "KHR_materials_diffuse_transmission",
                                            "KHR_materials_emissive_strength",
                                            "KHR_materials_ior",
                                            "KHR_materials_pbrSpecularGlossiness",
@@ -26,6 +27,7 @@ constexpr std::string_view kSupported[] = {"EXT_lights_area",
                                            "KHR_mesh_quantization",
                                            "KHR_meshopt_compression",
                                            "KHR_node_visibility",
+                                           "KHR_texture_basisu",
                                            "KHR_texture_transform"};
 
 bool isSupported(const std::string& extension) {

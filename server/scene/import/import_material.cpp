@@ -228,6 +228,7 @@ class MaterialImporter {
     const auto& info = material.at(pointer);
     const auto index = referenceOf(info, "index", countOf(context_.document.gltf, "textures"));
     if (!index) return {};
+    if (auto ok = checkIsNoKtx2(context_.document, *index); !ok) return ok;
     const auto& texture = context_.document.gltf["textures"][*index];
     const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
     if (!image) return {};

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/result.h"
+#include "server/scene/document/document.h"
 #include "server/scene/document/json_text.h"
 
 namespace radiosity::scene {
@@ -31,6 +33,10 @@ namespace radiosity::scene {
   const auto image = webp != nullptr ? referenceOf(*webp, "source", count) : std::nullopt;
   return image ? image : referenceOf(texture, "source", count);
 }
+
+/// KHR_texture_basisu: an error that names the image where a texture has no other. Clients turn KTX2 into PNG, since no
+/// transcoder comes with Debian.
+[[nodiscard]] Result<void> checkIsNoKtx2(const Document& document, std::size_t texture);
 
 /// Calls visit(owner, key, where) for each texture info of a material and its extensions, also of textures that light
 /// does not need: it is owner[key], and `where` its JSON pointer. The call may erase it. `value`: the material, at

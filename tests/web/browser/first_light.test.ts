@@ -102,7 +102,10 @@ function bright(emissiveStrength: number): string {
       { name: 'wall', mesh: 0, translation: [500, 0, 0], rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2] },
       { name: 'floor', mesh: 1, translation: [500, -0.5, 0.5] },
     ],
-    [{ emissiveFactor: [1, 1, 1], extensions }, { pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1], metallicFactor: 0 } }],
+    [
+      { emissiveFactor: [1, 1, 1], extensions },
+      { pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1], metallicFactor: 0 } },
+    ],
   );
 }
 

@@ -15,6 +15,18 @@ const RED: Colour = [200, 10, 20, 255];
 const CLEAR: Colour = [1, 2, 3, 128];
 const WHITE: Colour = [255, 255, 255, 255];
 
+/** 16 x 16 pixels, [200, 16, 24] on the left and [16, 64, 200] on the right, by Binomial's encoder 2.50 at its best. */
+const ETC1S = Buffer.from(
+  [
+    'q0tUWCAyMLsNChoKAAAAAAEAAAAQAAAAEAAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAACwAAACUAAAAJAAAALgAAAAAAAAAjQAA',
+    'AAAAAABFAQAAAAAAAAYAAAAAAAAAAAAAAAAAAAAsAAAAAAAAAAIAKACjAQIAAwMAAAgAAAAAAAAAAAA/AAAAAAAAAAAA/////x8A',
+    'AABLVFh3cml0ZXIAQmFzaXMgVW5pdmVyc2FsIDIuNTAAAAIAAgAtAAAACQAAAC8AAAAAAAAAAAAAAAAAAAAGAAAAAAAAAAAAAAAd',
+    'wJQAAAAAAAByQ4ABzAAAAAAAAEE4TzkAEwEAAAAAAEiBAGACAAAAAAAAwSIEAAAA+P///wcUwIQAAQAAAACyQQSACQABAAAAAMQR',
+    'YG7AAABAQACMIwqlET4AmAAAAAAAAEAAAVGFP9ihAQ==',
+  ].join(''),
+  'base64',
+);
+
 /** Pixels of a PNG, by a reader of its own: all rows are "up". */
 function readPng(png: Uint8Array): { width: number; height: number; channels: number; pixels: number[] } {
   const view = new DataView(png.buffer, png.byteOffset);
@@ -57,6 +69,24 @@ describe('KTX2 pictures', () => {
     expect([width, height]).toEqual([12, 4]);
     const at = (x: number, y: number) => [...rgba.subarray(4 * (12 * y + x), 4 * (12 * y + x) + 4)];
     for (const y of [0, 3]) expect([at(0, y), at(3, y), at(4, y), at(11, y)]).toEqual([RED, RED, CLEAR, WHITE]);
+  });
+
+  it('of ETC1S have the colours that were encoded', () => {
+    const { width, height, rgba } = decode(new Uint8Array(ETC1S));
+    expect([width, height]).toEqual([16, 16]);
+    for (const [x, colour] of [
+      [3, [200, 16, 24, 255]],
+      [12, [16, 64, 200, 255]],
+    ] as const)
+      for (const y of [0, 7, 15])
+        for (let c = 0; c < 4; ++c)
+          // ETC1S has five bits a channel and one step of brightness.
+          expect(Math.abs(rgba[4 * (16 * y + x) + c]! - colour[c]!)).toBeLessThanOrEqual(8);
+  });
+
+  it('of ETC1S that are cut short are refused', () => {
+    for (const bytes of [0, 79, 120, 200, 300, 330])
+      expect(() => decode(new Uint8Array(ETC1S.subarray(0, bytes)))).toThrow(/KTX 2.0|lies outside|damaged/);
   });
 
   it('become PNGs within their GLB, which nobody has to know the extension for', async () => {

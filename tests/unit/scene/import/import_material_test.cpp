@@ -62,6 +62,20 @@ TEST(ImportMaterial, whatTransmitsDiffuselyHasTwoSides) {
   EXPECT_THAT(warnings, Contains(HasSubstr("thin sheets")));
 }
 
+TEST(ImportMaterial, ktx2IsRefusedWhereLightNeedsIt) {
+  GltfBuilder builder;
+  builder.gltf["extensionsRequired"] = builder.gltf["extensionsUsed"] = {"KHR_texture_basisu"};
+  builder.gltf["images"] = Json::array({{{"uri", "data:image/ktx2;base64,q0tUWCAyMLsNChoK"}, {"name", "bumps"}}});
+  builder.gltf["textures"] = Json::array({{{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}}});
+  builder.gltf["materials"] = Json::array({{{"normalTexture", {{"index", 0}}}}});
+  EXPECT_EQ(imported(builder).materials.size(), 1U);
+  builder.gltf["materials"] = Json::array({{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}});
+  const auto scene = builder.scene();
+  ASSERT_FALSE(scene);
+  EXPECT_THAT(scene.error().message, HasSubstr("image 0 ('bumps') is KTX2"));
+  EXPECT_THAT(scene.error().where, HasSubstr("/textures/0/extensions/KHR_texture_basisu"));
+}
+
 TEST(ImportMaterial, metalIsGltfsDefault) {
   GltfBuilder builder;
   builder.gltf["materials"] = Json::array({{{"name", "foil"}}});
