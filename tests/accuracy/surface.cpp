@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <glm/common.hpp>
+#include <glm/exponential.hpp>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
