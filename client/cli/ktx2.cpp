@@ -1,21 +1,25 @@
 #include "client/cli/ktx2.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "client/cli/interrupt.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/transcoder_files.h"
 
@@ -23,10 +27,13 @@ namespace radiosity::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::json;
 
 constexpr std::string_view kExtension = "KHR_texture_basisu";
 constexpr int kNoProgram = 127;
 constexpr std::size_t kMostText = 4096;
+/// Of node, whose picture it is not told; ten megapixels take a second.
+constexpr std::chrono::minutes kMostTime{10};
 
 struct Folder {
   explicit Folder(std::string name) : path(std::move(name)) {}
@@ -69,6 +76,25 @@ struct Ran {
   std::string text;   ///< the first of what it printed
 };
 
+/// What the child prints until it ends. Errors: a signal has come, or it takes too long; the child is there still.
+Result<std::string> readAll(int from) {
+  std::string text;
+  std::array<char, 1024> part{};
+  const auto end = std::chrono::steady_clock::now() + kMostTime;
+  for (;;) {
+    if (interrupted()) return fail(ErrorCode::kCancelled, "interrupted");
+    if (std::chrono::steady_clock::now() > end) return fail(ErrorCode::kUnavailable, "node does not come to an end");
+    constexpr int kTickMs = 50;
+    pollfd wait{from, POLLIN, 0};
+    if (poll(&wait, 1, kTickMs) <= 0) continue;
+    const auto count = read(from, part.data(), part.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return text;
+    const auto room = kMostText - std::min(kMostText, text.size());
+    text.append(part.data(), std::min(room, static_cast<std::size_t>(count)));
+  }
+}
+
 Result<Ran> run(std::vector<std::string> command) {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) return fail(ErrorCode::kUnavailable, std::string("pipe: ") + strerror(errno));
@@ -82,21 +108,33 @@ Result<Ran> run(std::vector<std::string> command) {
     close(ends[0]);
     return fail(ErrorCode::kUnavailable, std::string("fork: ") + strerror(errno));
   }
-  Ran ran;
-  std::array<char, 1024> part{};
-  for (;;) {
-    const auto count = read(ends[0], part.data(), part.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) break;
-    const auto room = kMostText - std::min(kMostText, ran.text.size());
-    ran.text.append(part.data(), std::min(room, static_cast<std::size_t>(count)));
-  }
+  auto text = readAll(ends[0]);
   close(ends[0]);
+  if (!text) kill(child, SIGKILL);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
-  ran.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  if (!text) return tl::unexpected(text.error());
+  Ran ran{WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), std::move(*text)};
   while (!ran.text.empty() && ran.text.back() == '\n') ran.text.pop_back();
   return ran;
+}
+
+/// Whether a texture has no picture but one of KTX2. What is no sound glTF needs none: whoever reads it says why.
+bool needsPictures(const Json& gltf) {
+  const auto member = [](const Json& of, std::string_view name) -> const Json& {
+    static const Json kNone;
+    if (!of.is_object()) return kNone;
+    const auto found = of.find(name);
+    return found == of.end() ? kNone : *found;
+  };
+  const auto& images = member(gltf, "images");
+  for (const auto& texture : member(gltf, "textures")) {
+    if (member(member(texture, "extensions"), kExtension).is_null()) continue;
+    const auto& source = member(texture, "source");
+    const bool is_there = source.is_number_unsigned() && source.get<std::uint64_t>() < images.size();
+    if (!is_there || member(images[source.get<std::size_t>()], "mimeType") == "image/ktx2") return true;
+  }
+  return false;
 }
 
 /// What the script says of its input is of the user's file.
@@ -119,13 +157,14 @@ Result<void> transcode(const fs::path& folder, const std::string& from, const st
                 "has KTX2 textures, which node unpacks, and node was not found: install it (Debian: nodejs), drop the "
                 "file on the viewer, or export PNG, JPEG or WebP",
                 path);
+  if (interrupted()) return fail(ErrorCode::kCancelled, "interrupted");  // a terminal tells node, too
   if (ran->exit_code != 0) return fail(ErrorCode::kBadInput, ran->text.empty() ? "node failed" : ran->text, path);
   return {};
 }
 
 }  // namespace
 
-bool mayHaveKtx2(const std::string& path) {
+bool needsKtx2(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::array<char, 20> head{};
   file.read(head.data(), head.size());
@@ -142,12 +181,12 @@ bool mayHaveKtx2(const std::string& path) {
   } else {
     text.append(std::istreambuf_iterator<char>(file), {});
   }
-  return text.find(kExtension) != std::string::npos;
+  return text.find(kExtension) != std::string::npos && needsPictures(Json::parse(text, nullptr, false));
 }
 
 Result<SceneToSend> withoutKtx2(const std::string& path) {
   SceneToSend scene(path);
-  if (!mayHaveKtx2(path)) return scene;
+  if (!needsKtx2(path)) return scene;
   const auto kind = sceneKind(path);
   if (!kind) return tl::unexpected(kind.error());
   const auto folder = makeFolder();

@@ -22,12 +22,14 @@ class SceneToSend {
   std::shared_ptr<const void> folder_;  ///< removed with the last who has it
 };
 
-/// Whether the file speaks of KTX2 pictures. A file that cannot be read has none: whoever reads it next says why.
-[[nodiscard]] bool mayHaveKtx2(const std::string& path);
+/// Whether a texture has no picture but one of KTX2. A file that cannot be read has none: whoever reads it next says
+/// why.
+[[nodiscard]] bool needsKtx2(const std::string& path);
 
 /// The file itself where no picture has to be decoded, else a copy of it with PNGs, a .gltf with its external files
-/// packed into it. Errors: a picture that is no KTX2 or damaged, named with its JSON pointer; node is missing, or the
-/// program was built without the transcoder. Takes about a second for ten megapixels.
+/// packed into it. Errors: a picture that is no KTX2 or damaged, named with its JSON pointer; node is missing, or does
+/// not end, or the program was built without the transcoder; kCancelled within 50 ms of a signal. Takes about a second
+/// for ten megapixels.
 [[nodiscard]] Result<SceneToSend> withoutKtx2(const std::string& path);
 
 }  // namespace radiosity::cli

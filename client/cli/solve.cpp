@@ -100,7 +100,7 @@ class Solve {
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
-      by_path_ = *external && !mayHaveKtx2(options_.scene);
+      by_path_ = *external && !needsKtx2(options_.scene);
     }
     return checkOutputs({options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
   }

@@ -56,7 +56,8 @@ void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
   for (const auto& triangle : scene.triangles) {
     for (std::size_t k = 0; k < 3; ++k) hash.add(triangle.corners[k]), hash.add(triangle.shading[k]);
     hash.add(triangle.reflectance), hash.add(triangle.emission_lux), hash.add(triangle.double_sided);
-    for (const auto* use : {&triangle.base_colour, &triangle.emissive, &triangle.metal, &triangle.specular_texture}) {
+    for (const auto* use : {&triangle.base_colour, &triangle.emissive, &triangle.metal, &triangle.specular_texture,
+                            &triangle.transmission_part, &triangle.transmission_colour}) {
       addUse(*use, hash);
     }
     hash.add(triangle.metallic), hash.add(triangle.specular);

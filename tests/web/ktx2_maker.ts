@@ -70,7 +70,11 @@ interface GlbPicture {
 }
 
 /** A lit room's worth of glTF: a quad with a texture that has these pictures; `fallback`: for who knows no KTX2. */
-export function makeGlb(ktx2: GlbPicture, fallback?: GlbPicture): Uint8Array {
+export function makeGlb(
+  ktx2: GlbPicture,
+  fallback?: GlbPicture,
+  use: 'baseColorTexture' | 'normalTexture' = 'baseColorTexture',
+): Uint8Array {
   const corners = new Uint8Array(new Float32Array([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0]).buffer);
   const indices = new Uint8Array(new Uint16Array([0, 1, 2, 0, 2, 3]).buffer);
   const pictures = fallback ? [ktx2, fallback] : [ktx2];
@@ -92,7 +96,11 @@ export function makeGlb(ktx2: GlbPicture, fallback?: GlbPicture): Uint8Array {
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0 }],
     meshes: [{ primitives: [{ attributes: { POSITION: 0, TEXCOORD_0: 1 }, indices: 2, material: 0 }] }],
-    materials: [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 }, metallicFactor: 0 } }],
+    materials: [
+      use === 'normalTexture'
+        ? { normalTexture: { index: 0 }, pbrMetallicRoughness: { metallicFactor: 0 } }
+        : { pbrMetallicRoughness: { baseColorTexture: { index: 0 }, metallicFactor: 0 } },
+    ],
     textures: [fallback ? { source: 1, extensions } : { extensions }],
     images: pictures.map(({ name, mimeType }, i) => ({ name, mimeType, bufferView: 2 + i })),
     accessors: [

@@ -11,6 +11,7 @@
 #include "server/gpu/picture/view_sky.h"
 #include "server/solver/math/microfacets.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/patches/passing.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
 
@@ -40,6 +41,7 @@ class MirrorView {
       for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
         radiosity_.push_back(emission[leaf] + reflectance[leaf] * scene.irradiance[side.first_node + leaf]);
     }
+    addPassed(scene);
   }
 
   [[nodiscard]] bool isNeeded() const { return mirrors_ != nullptr; }
@@ -64,6 +66,18 @@ class MirrorView {
   }
 
  private:
+  /// What translucent surfaces let through.
+  void addPassed(const MirrorScene& scene) {
+    std::vector<glm::vec3> irradiance;  // by leaf value
+    for (const auto& side : sides_) {
+      const auto* first = &scene.irradiance[side.first_node];
+      irradiance.insert(irradiance.end(), first, first + side.leaf_count);
+    }
+    const auto areas = solver::leafAreas(*scene.patches, sides_);
+    for (const auto& leaf : solver::passingLeaves(scene.materials.transmittance, sides_, areas))
+      radiosity_[leaf.to] += leaf.of(irradiance);
+  }
+
   [[nodiscard]] glm::vec3 reflected(const solver::LeafRays::Place& at, std::uint32_t value, const glm::dvec3& direction,
                                     std::uint64_t key) const {
     const auto reflection =

@@ -323,6 +323,7 @@ class Burial {
       const auto& sides = patches_.surfaces[surface].first_node;
       const bool two_sided = sides[0] != kNone && sides[1] != kNone;
       LeafPoint& point = patches_.leaves[change.leaf];
+      point.beneath = record_.covered[surface];
       // Of a side that has lost all nobody asks where it is: the other keeps its places.
       if (!both && two_sided && change.point.triangle == kNone) continue;
       point.full = false;
@@ -335,6 +336,7 @@ class Burial {
         keepSpots(patches_, point, open.visible);
       } else if (both || !two_sided) {
         point = {};
+        point.beneath = record_.covered[surface];
       }
     }
   }

@@ -27,13 +27,10 @@ constexpr std::uint64_t kMostOfTwo = std::uint64_t{1} << 24;
 constexpr std::uint64_t kShadedThirds = 28, kDecodedThirds = 3 * kDecodedBytes;
 
 /// Textures that light needs.
-constexpr std::array<std::string_view, 7> kUsed = {"baseColorTexture",
-                                                   "emissiveTexture",
-                                                   "metallicRoughnessTexture",
-                                                   "diffuseTexture",
-                                                   "specularGlossinessTexture",
-                                                   "diffuseTransmissionTexture",
-                                                   "diffuseTransmissionColorTexture"};
+constexpr std::array<std::string_view, 8> kUsed = {"baseColorTexture",           "emissiveTexture",
+                                                   "metallicRoughnessTexture",   "diffuseTexture",
+                                                   "specularGlossinessTexture",  "transmissionTexture",
+                                                   "diffuseTransmissionTexture", "diffuseTransmissionColorTexture"};
 
 /// An index of that many things; `count` where it is none.
 std::size_t indexOf(const Json& value, std::size_t count) {
@@ -43,7 +40,9 @@ std::size_t indexOf(const Json& value, std::size_t count) {
 
 /// How an image is used: as colours, as numbers; what is used both ways is held twice.
 constexpr std::uint8_t kAsColours = 1, kAsNumbers = 2;
-std::uint8_t useOf(std::string_view key) { return key == "metallicRoughnessTexture" ? kAsNumbers : kAsColours; }
+std::uint8_t useOf(std::string_view key) {
+  return key == "metallicRoughnessTexture" || key == "transmissionTexture" ? kAsNumbers : kAsColours;
+}
 
 /// Marks what a material uses. Values nest at most 64 deep.
 void markUsed(const Json& value, const Json& textures, std::vector<std::uint8_t>& used) {

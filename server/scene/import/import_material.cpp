@@ -23,6 +23,7 @@ constexpr int kClamp = 33071;
 constexpr int kMirror = 33648;
 constexpr int kNearest = 9728;
 constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* kTransmissionTexture = "/extensions/KHR_materials_transmission/transmissionTexture";
 constexpr const char* kDiffuseTransmission = "KHR_materials_diffuse_transmission";
 
 float unit(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
@@ -48,7 +49,7 @@ class MaterialImporter {
     if (auto ok = specular != nullptr ? readSpecular(*specular, json, out) : readMetallic(source, json, out); !ok)
       return ok;
     if (auto ok = readTranslucent(json, out); !ok) return ok;
-    readOthers(json, out);
+    if (auto ok = readOthers(json, out); !ok) return ok;
     context_.scene.materials.push_back(std::move(out));
     return {};
   }
@@ -194,18 +195,19 @@ class MaterialImporter {
     return {};
   }
 
-  void readOthers(const Json& json, Material& out) {
+  Result<void> readOthers(const Json& json, Material& out) {
     if (const auto* ior = extensionOf(json, "KHR_materials_ior")) out.ior = clampedIor(ior->value("ior", 1.5));
     if (const auto* transmission = extensionOf(json, "KHR_materials_transmission")) {
       out.transmission = unit(transmission->value("transmissionFactor", 0.0));
-      if (transmission->contains("transmissionTexture")) {
-        context_.warn(pointer_, "transmissionTexture is ignored; the factor is used all over");
-      }
+      const auto texture = out.transmission > 0.0F ? meanRed(json, kTransmissionTexture) : 1.0F;
+      if (!texture) return tl::unexpected(texture.error());
+      out.transmission *= *texture;
     }
     if (const auto* volume = extensionOf(json, "KHR_materials_volume")) out.attenuation = attenuationOf(*volume);
     if (extensionOf(json, "KHR_materials_unlit") != nullptr) {
       context_.warn(pointer_, "KHR_materials_unlit: lit like any other surface");
     }
+    return {};
   }
 
   /// A reference that the schema lets pass although nothing is there.
@@ -219,6 +221,39 @@ class MaterialImporter {
 
   enum class Coding { kSrgb, kLinear };
 
+  /// What a texture info refers to: the texture, and its image. Both are there, or neither.
+  struct Picture {
+    const Json* texture = nullptr;
+    std::size_t image = 0;
+  };
+  Result<Picture> pictureOf(const Json& info) {
+    const auto index = referenceOf(info, "index", countOf(context_.document.gltf, "textures"));
+    if (!index) return Picture{};
+    if (auto ok = checkIsNoKtx2(context_.document, *index); !ok) return tl::unexpected(ok.error());
+    const auto& texture = context_.document.gltf["textures"][*index];
+    const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
+    return image ? Picture{&texture, *image} : Picture{};
+  }
+
+  /// Of the whole picture; 1 without one. How much passes is known for a surface as a whole.
+  Result<float> meanRed(const Json& material, const char* member) {
+    const Json::json_pointer pointer(member);
+    if (!material.contains(pointer)) return 1.0F;
+    const auto picture = pictureOf(material.at(pointer));
+    if (!picture) return tl::unexpected(picture.error());
+    if (picture->texture == nullptr) return 1.0F;
+    const auto* before = known(picture->image);
+    auto red = before != nullptr ? before->red : std::nullopt;
+    if (!red) {
+      const auto pixels = decode(picture->image, false);
+      if (!pixels) return tl::unexpected(pixels.error());
+      red = {meanOf(*pixels, 0), !sameChannel(*pixels, 0)};
+    }
+    if (red->varies) context_.warn(pointer_ + member, "varies; its mean is used all over");
+    keep(picture->image).red = red;
+    return red->mean;
+  }
+
   /// `member`: a JSON pointer into the material. Without such a texture, or with one that cannot be had, `use` stays as
   /// it is.
   Result<void> readTexture(const Json& material, const std::string& member, Coding coding, TextureUse& use) {
@@ -226,12 +261,9 @@ class MaterialImporter {
     const Json::json_pointer pointer(member);
     if (!material.contains(pointer)) return {};
     const auto& info = material.at(pointer);
-    const auto index = referenceOf(info, "index", countOf(context_.document.gltf, "textures"));
-    if (!index) return {};
-    if (auto ok = checkIsNoKtx2(context_.document, *index); !ok) return ok;
-    const auto& texture = context_.document.gltf["textures"][*index];
-    const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
-    if (!image) return {};
+    const auto picture = pictureOf(info);
+    if (!picture) return tl::unexpected(picture.error());
+    if (picture->texture == nullptr) return {};
     TextureUse read;
     read.texcoord = static_cast<int>(info.value("texCoord", 0));
     readTransform(info, read);
@@ -242,8 +274,8 @@ class MaterialImporter {
     // Where a file names no filter the choice is ours. Charts of an atlas lie side by side, and metal is a matter of
     // yes or no: a texel of it does not shade off into the next.
     read.nearest = coding == Coding::kLinear;
-    if (auto ok = readSampler(texture, read); !ok) return ok;
-    const auto loaded = coding == Coding::kSrgb ? colorTexture(*image) : dataTexture(*image);
+    if (auto ok = readSampler(*picture->texture, read); !ok) return ok;
+    const auto loaded = coding == Coding::kSrgb ? colorTexture(picture->image) : dataTexture(picture->image);
     if (!loaded) return tl::unexpected(loaded.error());
     read.texture = *loaded;
     use = read;
@@ -379,7 +411,7 @@ class MaterialImporter {
       auto texture = decode(image, false);
       if (!texture) return tl::unexpected(texture.error());
       data.blue = sameChannel(*texture, 2);
-      data.mean_green = meanGreen(*texture);
+      data.mean_green = meanOf(*texture, 1);
       const bool is_metal = !data.blue || *data.blue > 0.0F;
       if (is_metal && !(data.blue && sameChannel(*texture, 1)))
         data.data = std::make_shared<const Texture>(std::move(*texture));
@@ -404,9 +436,9 @@ class MaterialImporter {
     return texture.rgba.size() > channel ? static_cast<float>(texture.rgba[channel]) / 255.0F : 1.0F;
   }
 
-  static float meanGreen(const Texture& texture) {
+  static float meanOf(const Texture& texture, std::size_t channel) {
     std::uint64_t sum = 0;
-    for (std::size_t i = 1; i < texture.rgba.size(); i += 4) sum += texture.rgba[i];
+    for (std::size_t i = channel; i < texture.rgba.size(); i += 4) sum += texture.rgba[i];
     const auto pixels = texture.rgba.size() / 4;
     return pixels > 0 ? static_cast<float>(static_cast<double>(sum) / (255.0 * static_cast<double>(pixels))) : 1.0F;
   }

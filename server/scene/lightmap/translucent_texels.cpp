@@ -21,7 +21,8 @@ void joinSide(const PatchMaterials& materials, std::size_t number, SidesOf what,
       of_own *= of_own;
       of_beyond *= of_beyond;
     }
-    joined[leaf] = of_own * own[leaf] + of_beyond * beyond[leaf];
+    const auto light = of_own * own[leaf] + of_beyond * beyond[leaf];
+    for (int c = 0; c < 3; ++c) joined[leaf][c] = base[leaf][c] > 0.0F ? light[c] : own[leaf][c];
   }
 }
 

@@ -73,6 +73,7 @@ class MaterialShader {
     primitive_ = &patches_.cuts.primitiveOf(scene_, surface_.instance);
     if (!layers_.hasTextures() && primitive_->color0.empty()) {
       fill(clamped(layers_.at([](const TextureUse&) { return MaterialLayers::Place{}; }, glm::vec4(1.0F))));
+      limitPassing();
       return;
     }
     shadeLeaves();
@@ -85,6 +86,7 @@ class MaterialShader {
         coloursOf(out_)[i]->assign(side, nodes_[i]);
       }
     }
+    limitPassing();
   }
 
   [[nodiscard]] bool wasClamped() const { return was_clamped_; }
@@ -125,6 +127,28 @@ class MaterialShader {
       const auto side = out_.emission.sideOf(first);
       for (std::size_t i = 0; i < kColours; ++i)
         if (isKept(i)) coloursOf(out_)[i]->fill(side, coloursOf(value)[i]);
+    }
+  }
+
+  /// Where less of a leaf is free behind than in front no more passes than arrives there.
+  void limitPassing() {
+    if (!isKept(kOfOneSide)) return;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto first = surface_.first_node[i], other = surface_.first_node[1 - i];
+      const auto side = out_.transmittance.sideOf(first);
+      const auto count = std::size_t{surface_.width} * surface_.height;
+      const auto part = [&](std::size_t leaf) {
+        const float to = patches_.node_area[first + leaf], from = patches_.node_area[other + leaf];
+        return to > from ? from / to : 1.0F;
+      };
+      std::size_t leaf = 0;
+      while (leaf < count && part(leaf) == 1.0F) ++leaf;
+      if (leaf == count) continue;
+      auto& passed = nodes_.front();
+      passed.resize(levelGrid(surface_.width, surface_.height, surface_.level_count).offset);
+      for (leaf = 0; leaf < count; ++leaf) passed[leaf] = part(leaf) * out_.transmittance.side(side)[leaf];
+      average(first, passed);
+      out_.transmittance.assign(side, passed);
     }
   }
 

@@ -141,9 +141,12 @@ LinkedSolver::FieldSums LinkedSolver::assessField() const {
 /// Flux that leaves a side since it arrived on the other.
 glm::dvec3 LinkedSolver::passedFlux(const Side& side) const {
   glm::dvec3 flux(0.0);
-  for (const auto& leaf : passingTo(system_.passing(), side))
-    flux += glm::dvec3(leaf.transmittance * lightOf(leaf.from) * system_.leafAreas()[leaf.to]);
+  for (const auto& leaf : passingTo(system_.passing(), side)) flux += passedFlux(leaf);
   return flux;
+}
+
+glm::dvec3 LinkedSolver::passedFlux(const PassingLeaf& leaf) const {
+  return glm::dvec3(leaf.transmittance * lightOf(leaf.from) * system_.leafAreas()[leaf.to]);
 }
 
 double LinkedSolver::fieldNorm() const {
@@ -273,13 +276,17 @@ EnergyParts LinkedSolver::energy() const {
   for (const auto& side : sides_) {
     const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
     const auto emission = system_.emission().side(side.number), reflectance = system_.reflectance().side(side.number);
-    // What the other side has absorbed of this side's light is that side's, and this one's less.
-    glm::dvec3 emitted(0.0), absorbed = -passedFlux(side), specular(0.0);
+    glm::dvec3 emitted(0.0), absorbed(0.0), specular(0.0);
+    const auto takenBy = [&](std::uint32_t value) -> auto& {
+      return mirrors_ && mirrors_->has(value) ? specular : absorbed;
+    };
+    for (const auto& leaf : passingTo(system_.passing(), side))  // where it arrives it counts as absorbed
+      takenBy(leaf.from) -= passedFlux(leaf);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
       emitted += area * glm::dvec3(emission[leaf]);
-      auto& of_leaf = mirrors_ && mirrors_->has(side.first_value + leaf) ? specular : absorbed;
-      of_leaf += area * (1.0 - glm::dvec3(reflectance[leaf])) * glm::dvec3(lightOf(side.first_value + leaf));
+      takenBy(side.first_value + leaf) +=
+          area * (1.0 - glm::dvec3(reflectance[leaf])) * glm::dvec3(lightOf(side.first_value + leaf));
     }
     for (int c = 0; c < 3; ++c) {
       const auto i = static_cast<std::size_t>(c);

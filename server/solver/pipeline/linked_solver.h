@@ -214,6 +214,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> lampsOfLeaves() const;
   [[nodiscard]] LeftLight leftLight() const;
   [[nodiscard]] glm::dvec3 passedFlux(const Side& side) const;
+  [[nodiscard]] glm::dvec3 passedFlux(const PassingLeaf& leaf) const;
   [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
   [[nodiscard]] std::shared_ptr<const LeafRays> leafRays();

@@ -2,10 +2,12 @@
 // B = E + rho H + tau H of the other side.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/scenes.h"
@@ -93,6 +95,25 @@ TEST_P(Translucent, ASheetBetweenALitAndADarkCubeSendsItsTransmittanceOn) {
   EXPECT_NEAR(kept, 1.0, 0.01) << "a closed scene keeps its light";
 }
 
+// As files have it that hold each side by itself, ours among them.
+TEST(TranslucentSheet, ThatIsThereTwiceTurnedOverIsOneSheet) {
+  for (const bool turned_first : {false, true}) {
+    auto scene = twoCubes(sheetOf(0.8, 0.6, glm::dvec3(0.9)), {"lit", glm::dvec3(0.0), glm::dvec3(1.0)},
+                          {"dark", glm::dvec3(0.0), glm::dvec3(0.0)});
+    auto turned = scene.objects.back();
+    std::ranges::reverse(turned.polygons.front().corners);
+    scene.objects.insert(scene.objects.end() - (turned_first ? 1 : 0), turned);
+    const auto loaded = load(scene, 3000);
+    Solve solve(loaded, settingsOf(Method::kGather, 0.01));
+    ASSERT_TRUE(solve.run());
+    expectSound(solve);
+    EXPECT_NEAR(5.0 * meanOf(solve, loaded, kSecond, true).x, 0.54 * kPi, 0.01 * 0.54 * kPi) << turned_first;
+    const auto energy = solve.solver().energy();
+    EXPECT_NEAR(energy.backface[0] / energy.emitted[0], 0.0, 1e-3) << turned_first;
+    EXPECT_NEAR(energy.imbalance[0] / energy.emitted[0], 0.0, 0.01) << turned_first;
+  }
+}
+
 // The same light on both sides, and as much of it sent on as walls reflect: nobody can tell that there is a sheet.
 TEST_P(Translucent, AFurnaceDividedByASheetIsStillAFurnace) {
   const double rho = 0.7, factor = 0.5;  // reflects 0.35 of the light, lets 0.35 through
@@ -144,9 +165,11 @@ TEST(TranslucentEdit, OfTheFactorKeepsAllRaysAndEqualsAFreshSolve) {
   ASSERT_TRUE(fresh.run());
   expectSound(edited);
   EXPECT_EQ(edited.solver().linkCounters().samples, samples) << "lamps see what they saw";
-  for (const bool front : {true, false}) {
-    const auto a = meanOf(edited, after, kSecond, true), b = meanOf(fresh, after, kSecond, true);
-    EXPECT_NEAR(a.x / b.x, 1.0, 0.01) << front;
+  using Part = std::pair<std::uint32_t, bool>;
+  for (const auto& [object, front] :
+       {Part(kFirst, true), Part(kSecond, true), Part(kSheet, true), Part(kSheet, false)}) {
+    const auto a = meanOf(edited, after, object, front), b = meanOf(fresh, after, object, front);
+    EXPECT_NEAR(a.x / b.x, 1.0, 0.01) << object << front;
   }
 }
 

@@ -7,6 +7,7 @@ import unittest
 import urllib.error
 import urllib.request
 
+import pictures
 import plates
 from harness import ServiceCase
 
@@ -26,8 +27,8 @@ def make_ktx2(colour, width=4, height=4, claimed=None):
 
 
 class Ktx2Test(ServiceCase):
-    def write_scene(self, name, ktx2):
-        """The plates, their floor painted by a KTX2 texture."""
+    def write_scene(self, name, ktx2, png=None):
+        """The plates, their floor painted by a KTX2 texture, or by a PNG for those who do not know it."""
         gltf = plates.lit_document()
         body = b"".join(plates._quads())
         gltf["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(body).decode()
@@ -35,7 +36,12 @@ class Ktx2Test(ServiceCase):
         gltf["images"] = [{"uri": "paint.ktx2", "name": "paint"}]
         gltf["textures"] = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
         gltf["extensionsUsed"] = gltf.get("extensionsUsed", []) + ["KHR_texture_basisu"]
-        gltf["extensionsRequired"] = ["KHR_texture_basisu"]
+        if png:
+            (self.folder / "paint.png").write_bytes(png)
+            gltf["images"].append({"uri": "paint.png"})
+            gltf["textures"][0]["source"] = 1
+        else:
+            gltf["extensionsRequired"] = ["KHR_texture_basisu"]
         gltf["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
         scene = self.folder / name
         scene.write_text(json.dumps(gltf))
@@ -48,6 +54,9 @@ class Ktx2Test(ServiceCase):
         self.assertNotIn("KHR_texture_basisu", json.dumps(glb.json))
         self.assertEqual(glb.json["textures"], [{"source": 0}])
         self.assertEqual(glb.json["images"][0]["mimeType"], "image/png")
+        view = glb.json["bufferViews"][glb.json["images"][0]["bufferView"]]
+        png = glb.buffer(view["buffer"])[view.get("byteOffset", 0):][:view["byteLength"]]
+        self.assertAlmostEqual(pictures.brightness(png), sum(RED[:3]) / 3, delta=0.01)
 
     def test_thatAreDamagedAreRefusedWithTheirName(self):
         scene = self.write_scene("room.gltf", make_ktx2(RED, claimed=2**30))
@@ -62,6 +71,9 @@ class Ktx2Test(ServiceCase):
         bare.mkdir()
         text = self.complaint("solve", scene, "-o", "lit.glb", env={**os.environ, "PATH": str(bare)})
         self.assertIn("node was not found", text)
+        scene = self.write_scene("both.gltf", make_ktx2(RED), png=pictures.onePixel(RED[:3]))
+        self.client("solve", scene, "-o", "lit.glb", "--error", 0.05, "--texels", 2000,
+                    env={**os.environ, "PATH": str(bare)})
 
     def test_areRefusedByTheServerWithTheirName(self):
         scene = json.loads(self.write_scene("room.gltf", make_ktx2(RED)).read_text())

@@ -1,4 +1,4 @@
-"""PNG, read as far as the tests need."""
+"""PNG, read and written as far as the tests need."""
 import struct
 import zlib
 
@@ -24,3 +24,12 @@ def brightness(png):
         total += sum(row)
         above = row
     return total / (stride * height)
+
+
+def onePixel(colour):
+    """A PNG of one RGB pixel."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", 1, 1, 8, 2, 0, 0, 0)) + \
+        chunk(b"IDAT", zlib.compress(b"\0" + bytes(colour))) + chunk(b"IEND", b"")

@@ -63,4 +63,15 @@ struct GltfBuilder {
   }
 };
 
+/// Of bytes as they are.
+inline std::string dataUri(const std::string& bytes) {
+  constexpr const char* kDigits = "0123456789ABCDEF";
+  std::string uri = "data:application/octet-stream,";
+  for (const char byte : bytes) {
+    const auto value = static_cast<unsigned char>(byte);
+    uri += {'%', kDigits[value >> 4U], kDigits[value & 15U]};
+  }
+  return uri;
+}
+
 }  // namespace radiosity::scene::test

@@ -89,6 +89,23 @@ describe('KTX2 pictures', () => {
       expect(() => decode(new Uint8Array(ETC1S.subarray(0, bytes)))).toThrow(/KTX 2.0|lies outside|damaged/);
   });
 
+  it('leave a file as it is where none is needed, or its JSON is none that has them', async () => {
+    const png = { name: 'png', bytes: new Uint8Array([1]), mimeType: 'image/png' };
+    const spare = makeGlb({ name: 'paint', bytes: makeKtx2([[RED]]), mimeType: 'image/ktx2' }, png);
+    expect(await withoutKtx2(spare, decode)).toBe(spare);
+    const extensions = { KHR_texture_basisu: { source: 0 } };
+    for (const odd of [
+      { textures: {}, extensionsUsed: ['KHR_texture_basisu'] },
+      { textures: [null], extensionsUsed: ['KHR_texture_basisu'] },
+      { textures: [{ extensions }], images: [{ uri: 5 }] },
+      { textures: [{ extensions }], images: [{ bufferView: 0 }], bufferViews: 'none' },
+      { textures: [{ extensions }], images: [{ bufferView: 0 }], extensionsUsed: 'KHR_texture_basisu' },
+    ]) {
+      const file = new TextEncoder().encode(JSON.stringify(odd));
+      expect(await withoutKtx2(file, decode), JSON.stringify(odd)).toBe(file);
+    }
+  });
+
   it('become PNGs within their GLB, which nobody has to know the extension for', async () => {
     const glb = makeGlb({ name: 'paint', bytes: makeKtx2([[RED], [WHITE]]), mimeType: 'image/ktx2' });
     const { gltf, binary } = readGlb(await withoutKtx2(glb, decode));

@@ -2,12 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/scene/document/png.h"
 #include "server/scene/lightmap/lightmap.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
 namespace {
 
+using test::dataUri;
 using test::GltfBuilder;
 using testing::Contains;
 using testing::ElementsAre;
@@ -60,6 +62,23 @@ TEST(ImportMaterial, whatTransmitsDiffuselyHasTwoSides) {
   const auto warnings = builder.scene()->warnings;
   EXPECT_THAT(warnings, Contains(HasSubstr("emits from both")));
   EXPECT_THAT(warnings, Contains(HasSubstr("thin sheets")));
+}
+
+// How much passes is known for a surface as a whole: of a mask the mean is right for the room, though not for the edge
+// of its shadow.
+TEST(ImportMaterial, transmissionIsMultipliedByTheMeanOfItsTexture) {
+  for (const bool varies : {false, true}) {
+    const std::vector<std::uint8_t> pixels{51, 255, 255, std::uint8_t(varies ? 153 : 51), 0, 0};
+    const auto png = encodePng(2, 1, 3, pixels);
+    GltfBuilder builder;
+    builder.gltf["images"] = Json::array({{{"uri", dataUri({png.begin(), png.end()})}}});
+    builder.gltf["textures"] = Json::array({{{"source", 0}}});
+    const Json glass{{"transmissionFactor", 0.5}, {"transmissionTexture", {{"index", 0}}}};
+    builder.gltf["materials"] = Json::array({{{"extensions", {{"KHR_materials_transmission", glass}}}}});
+    EXPECT_NEAR(imported(builder).materials.at(0).transmission, varies ? 0.2F : 0.1F, 1e-6F);
+    const auto warnings = testing::Contains(HasSubstr("/transmissionTexture: varies")).Times(varies ? 1 : 0);
+    EXPECT_THAT(builder.scene()->warnings, warnings);
+  }
 }
 
 TEST(ImportMaterial, ktx2IsRefusedWhereLightNeedsIt) {

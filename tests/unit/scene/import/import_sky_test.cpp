@@ -16,6 +16,7 @@
 namespace radiosity::scene {
 namespace {
 
+using test::dataUri;
 using test::expectRefused;
 using test::GltfBuilder;
 using test::Json;
@@ -39,16 +40,6 @@ Scene imported(const GltfBuilder& builder) {
 /// Two columns, one row: 1 towards -Z and 2 towards +Z.
 const std::string kHdr =
     "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + std::string("\x80\x80\x80\x81\x80\x80\x80\x82", 8);
-
-std::string dataUri(const std::string& bytes) {
-  constexpr const char* kDigits = "0123456789ABCDEF";
-  std::string uri = "data:application/octet-stream,";
-  for (const char byte : bytes) {
-    const auto value = static_cast<unsigned char>(byte);
-    uri += {'%', kDigits[value >> 4U], kDigits[value & 15U]};
-  }
-  return uri;
-}
 
 TEST(ImportSky, ColoursAreAsTheyWere) {
   const auto sky = imported(withSky({{"upper", {1, 2, 3}}})).sky;

@@ -164,6 +164,24 @@ TEST(Shade, ReflectanceAndTransmittanceAreLoweredTogether) {
   EXPECT_EQ(shadePatches(sceneOf(floorQuad(1.0)), patches).transmittance.sideCount(), 0U) << "nothing is translucent";
 }
 
+// Something stands against the back of one leaf: a tenth of it is free, and no more light arrives to pass.
+TEST(Shade, ALeafThatIsHalfCoveredPassesWhatArrivesOnTheRest) {
+  Scene scene;
+  Material paper;
+  paper.double_sided = true;
+  paper.base_color = glm::vec3(0.5F);
+  paper.diffuse_transmission = 1.0F;
+  paper.diffuse_transmission_color = glm::vec3(0.8F);
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), paper);
+  PatchScene patches = build(scene, 10);
+  const auto [front, back] = patches.surfaces.at(0).first_node;
+  patches.node_area[back] *= 0.1F;
+  const PatchMaterials materials = shadePatches(scene, patches);
+  EXPECT_NEAR(materials.transmittance[front].x, 0.08F, 1e-6F);
+  EXPECT_NEAR(materials.transmittance[front + 1].x, 0.8F, 1e-6F);
+  EXPECT_NEAR(materials.transmittance[back].x, 0.8F, 1e-6F);
+}
+
 TEST(Shade, ReflectanceOfOneIsLoweredWithAWarning) {
   const Scene scene = sceneOf(floorQuad(1.0));
   const PatchScene patches = build(scene, 10);

@@ -11,10 +11,10 @@ import {
   type Object3D,
   PerspectiveCamera,
   SRGBColorSpace,
-  type Texture,
+  Texture,
   Vector3,
 } from 'three';
-import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
+import { GLTFLoader, type GLTF, type GLTFLoaderPlugin, type GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
 import { isVisible } from '../../document/edits';
 import type { Gltf, GltfNode, GltfTextureInfo, SpecularGlossiness } from '../../document/gltf';
 import type { LampWebs } from '../../document/lights';
@@ -28,6 +28,17 @@ import { PlaneMarkers } from './plane_markers';
 interface Association {
   nodes?: number;
   materials?: number;
+}
+
+/**
+ * Pictures of KTX2 are those that light does not need, bumps say, and nothing is drawn with them. Without this the whole
+ * scene would be refused.
+ */
+function withoutKtx2(parser: GLTFParser): GLTFLoaderPlugin {
+  const textures = (parser.json as { textures?: { source?: number }[] }).textures;
+  const loadTexture = (index: number) =>
+    textures?.[index]?.source === undefined ? Promise.resolve(new Texture()) : null;
+  return { name: 'KHR_texture_basisu', loadTexture };
 }
 
 export class LitScene {
@@ -49,7 +60,7 @@ export class LitScene {
 
   /** Reads a GLB of /scene.glb. Rejects when it cannot be drawn. */
   static async load(glb: ArrayBuffer, set: LightmapSet, view: ViewUniforms, anisotropy: number): Promise<LitScene> {
-    const gltf = await new GLTFLoader().parseAsync(glb, '');
+    const gltf = await new GLTFLoader().register(withoutKtx2).parseAsync(glb, '');
     await readAllSpecularGlossiness(gltf);
     return new LitScene(gltf, set, view, anisotropy);
   }
