@@ -71,7 +71,8 @@ double LinkedSolver::usualRadiosity() const {
   std::vector<double> flux(kSteps);
   double all = 0.0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    if (sides_[s].gathered || sideShines(s)) continue;
+    // What lets light through is like a lamp: the inside of a paper shade is brighter than all else.
+    if (sides_[s].gathered || sideShines(s) || !passingTo(system_.passing(), sides_[s]).empty()) continue;
     for (auto node = sides_[s].first_node; node < sides_[s].first_node + sides_[s].leaf_count; ++node) {
       const auto area = static_cast<double>(patches_->node_area[node]),
                  of_leaf = static_cast<double>(unshot_.rough(node));
