@@ -73,6 +73,8 @@ class LinkSystem {
   [[nodiscard]] const scene::SideColours& transmittance() const { return transmittance_; }
   /// All leaves that let light through (passing.h).
   [[nodiscard]] std::span<const PassingLeaf> passing() const { return passing_; }
+  /// Whether light that arrives on the other side leaves here.
+  [[nodiscard]] bool letsThrough(const Side& side) const;
   /// Unit box squared, by leaf value.
   [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
 
@@ -176,7 +178,6 @@ class LinkSystem {
     const float *own = nullptr, *beyond = nullptr;
   };
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const SideLinks& links);
-  [[nodiscard]] bool letsThrough(const Side& side) const;
   void beginHalf(std::size_t half);
   void advanceHalf(std::size_t half);
   void sweep(std::size_t half, Gmres<double>::Vectors& sent, bool affine);

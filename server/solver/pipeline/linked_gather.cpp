@@ -72,7 +72,7 @@ double LinkedSolver::usualRadiosity() const {
   double all = 0.0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     // What lets light through is like a lamp: the inside of a paper shade is brighter than all else.
-    if (sides_[s].gathered || sideShines(s) || isTranslucent(s)) continue;
+    if (sides_[s].gathered || sideShines(s) || system_.letsThrough(sides_[s])) continue;
     for (auto node = sides_[s].first_node; node < sides_[s].first_node + sides_[s].leaf_count; ++node) {
       const auto area = static_cast<double>(patches_->node_area[node]),
                  of_leaf = static_cast<double>(unshot_.rough(node));
@@ -100,13 +100,11 @@ std::vector<double> LinkedSolver::leastRadiosity() const {
   const double least = area > 0.0 ? std::max(kBright * flux / area, kBrightBesideUsual * usualRadiosity()) : 0.0;
   std::vector<double> of_side(sides_.size(), least);
   for (std::uint32_t s = 0; s < sides_.size() && !patches_->opacity.empty(); ++s) {
-    const bool is_lamp = sideShines(s) || isTranslucent(s);
+    const bool is_lamp = sideShines(s) || system_.letsThrough(sides_[s]);
     if (patches_->surfaces[sides_[s].surface].see_through || !is_lamp) of_side[s] = HUGE_VAL;
   }
   return of_side;
 }
-
-bool LinkedSolver::isTranslucent(std::uint32_t s) const { return !passingTo(system_.passing(), sides_[s]).empty(); }
 
 /// By itself, and not as a polygon.
 bool LinkedSolver::sideShines(std::uint32_t s) const {

@@ -181,7 +181,6 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] bool wantsLamp() const;
   [[nodiscard]] bool sideShines(std::uint32_t side) const;
-  [[nodiscard]] bool isTranslucent(std::uint32_t side) const;
   [[nodiscard]] bool assessStep();
   /// What the halves' light says, of all leaves; received and reflected flux.
   struct FieldSums {
