@@ -56,7 +56,7 @@ OWN_INCLUDES = [
         "error": "patches",
         "lamps": "math patches rays transport",
         "edits": "math patches transport",
-        "reflected": "edits math patches rays",
+        "reflected": "edits lamps math patches rays",
         "variation": "edits lamps math patches rays reflected",
         "surface": "lamps math patches rays",
         "planes": "math patches rays surface",

@@ -89,7 +89,8 @@ std::vector<glm::vec3> LinkedSolver::spreadLight() const {
   for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
   for (std::uint32_t value = 0; value < light[0].size(); ++value) {
     const auto arriving = 0.5F * (light[0][value] + light[1][value]);
-    const bool spreads = mirrors_->has(value) && !mirrors_->isGlass(value);
+    const bool is_imaged = source_images_.images && source_images_.images->isIn(value);
+    const bool spreads = mirrors_->has(value) && !mirrors_->isGlass(value) && !is_imaged;
     light[0][value] = spreads ? mirrors_->meanReflectance(value) * arriving : glm::vec3(0.0F);
   }
   return std::move(light[0]);
@@ -102,6 +103,26 @@ std::array<double, 3> LinkedSolver::spreadFlux() const {
     for (std::size_t c = 0; c < 3; ++c)
       flux[c] += static_cast<double>(system_.leafAreas()[value] * light[value][static_cast<int>(c)]);
   }
+  for (std::size_t c = 0; c < 3 && gathers(); ++c) flux[c] += gather_->spreadFlux()[c];
+  return flux;
+}
+
+/// What flat mirrors reflect of lights that are no surfaces, and no leaf gets as an image: it leaves the scene, where
+/// anything does. Nobody looks where it goes.
+std::array<double, 3> LinkedSolver::imagesThatLeave() const {
+  std::array<double, 3> flux{};
+  if (!source_images_.images || !gathers()) return flux;
+  const auto& escapes = gather_->escapedFlux();
+  if (escapes[0] + escapes[1] + escapes[2] <= 0.0) return flux;
+  std::array<std::vector<glm::vec3>, 2> light;
+  for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
+  for (std::uint32_t value = 0; value < light[0].size(); ++value) {
+    if (!source_images_.images->isIn(value) || mirrors_->isGlass(value)) continue;
+    const auto reflected = mirrors_->meanReflectance(value) * 0.5F * (light[0][value] + light[1][value]);
+    for (std::size_t c = 0; c < 3; ++c)
+      flux[c] += static_cast<double>(system_.leafAreas()[value] * reflected[static_cast<int>(c)]);
+  }
+  for (std::size_t c = 0; c < 3; ++c) flux[c] = std::max(0.0, flux[c] - gather_->imagedFlux()[c]);
   return flux;
 }
 
@@ -296,13 +317,13 @@ EnergyParts LinkedSolver::energy() const {
       parts.specular[i] += specular[c];
     }
   }
-  const auto sky = skyFlux(), spread = spreadFlux();
+  const auto sky = skyFlux(), spread = spreadFlux(), leaves = imagesThatLeave();
   for (std::size_t c = 0; c < 3; ++c) {
     parts.emitted[c] += sky[c];
     if (gathers()) {
-      parts.escaped[c] += gather_->escapedFlux()[c] + sky[c] - gather_->skyFlux()[c];
+      parts.escaped[c] += gather_->escapedFlux()[c] + sky[c] - gather_->skyFlux()[c] + leaves[c];
       parts.backface[c] += gather_->absorbedFlux()[c];
-      parts.specular[c] -= gather_->mirroredFlux()[c] + spread[c];
+      parts.specular[c] -= gather_->mirroredFlux()[c] + spread[c] + leaves[c];
     } else {
       parts.unshot[c] += sky[c];
     }

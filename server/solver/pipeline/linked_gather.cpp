@@ -45,6 +45,8 @@ constexpr double kAlone = 1.5;
 constexpr double kSampleGain = 0.97;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
+/// Of the room, what the noise of images of lamps in mirrors may take: it falls faster than that of rays.
+constexpr double kImages = 0.2;
 
 }  // namespace
 
@@ -143,6 +145,28 @@ void LinkedSolver::startRays() {
                                          system_.leafAreas());
   gather_->shadeFor(&shaded_.shading());
   gather_->reflectBy(mirrors_);
+  findImages();
+}
+
+/// Of lamps that shine, in flat mirrors. Those of a crowd are too many.
+void LinkedSolver::findImages() {
+  lamp_images_ = source_images_ = {};
+  if (!gather_ || !mirrors_) return;
+  std::vector<LightPolygon> lamps;
+  std::vector<PunctualLights::Source> sources;
+  const auto& areas = system_.leafAreas();
+  least_imaged_ = LampImages::leastEmission(lights_, std::reduce(areas.begin(), areas.end(), 0.0));
+  std::ranges::copy_if(lights_, std::back_inserter(lamps),
+                       [&](const LightPolygon& lamp) { return channelSum(lamp.emission) > least_imaged_; });
+  std::ranges::copy_if(sources_, std::back_inserter(sources),
+                       [](const PunctualLights::Source& source) { return source.intensity != glm::dvec3(0.0); });
+  const bool is_crowded = std::ranges::any_of(crowds_, [](const Crowd& crowd) { return !crowd.isDark(); });
+  const auto find = [&](std::span<const LightPolygon> of_lamps, std::span<const PunctualLights::Source> of_sources) {
+    return ImagedLight::Lamps{LampImages::find(*patches_, sides_, leaf_rays_, mirrors_, of_lamps, of_sources),
+                              LampImages::lightOf(of_lamps, of_sources)};
+  };
+  if (!is_crowded) lamp_images_ = find(lamps, {});
+  source_images_ = find({}, sources);
 }
 
 std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {
@@ -173,6 +197,15 @@ std::vector<glm::vec3> LinkedSolver::lampsOfLeaves() const {
   return emission;
 }
 
+/// Of these, of the lamps that images are looked for of.
+std::vector<glm::vec3> LinkedSolver::imagedLamps() const {
+  if (!lamp_images_.images) return {};
+  auto emission = lampsOfLeaves();
+  for (auto& lamp : emission)
+    if (channelSum(lamp) <= least_imaged_) lamp = glm::vec3(0.0F);
+  return emission;
+}
+
 LeftLight LinkedSolver::leftLight() const {
   LeftLight light;
   light.residual = std::clamp(kResidual * settings_.target_error, kLeastResidual, kMostResidual);
@@ -180,6 +213,9 @@ LeftLight LinkedSolver::leftLight() const {
   light.reflectance = ofLeaves(system_.reflectance());
   light.mirrors = mirrors_;
   if (mirrors_) light.lamps = lampsOfLeaves();
+  light.imaged_lamps = imagedLamps();
+  light.lamp_images = lamp_images_;
+  light.source_images = source_images_;
   const auto spread = spreadLight();
   for (std::size_t value = 0; value < spread.size(); ++value) light.emission[value] += spread[value];
   light.passing.assign(system_.passing().begin(), system_.passing().end());
@@ -260,6 +296,8 @@ StepOutcome LinkedSolver::chooseRays() {
   const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
   // What is in doubt is no reason for the rest to be mottled.
   if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
+  const double norm = fieldNorm(), of_images = gather_->imageNoise() / std::max(norm * norm, 1e-300);
+  if (of_images > kImages * room && gather_->refineImages(of_images / (kImages * room))) return StepOutcome::kRoundDone;
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   // Samples alone lowered nothing: what halves of the rays differ by after some bounces was taken for the links'.

@@ -88,6 +88,7 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
   mirrors_ = SpecularLeaves::find(sides_, materials, patches_->surfaces);
   if (gather_) gather_->reflectBy(mirrors_);
   takeLights();
+  findImages();
   double area = 0.0;
   glm::dvec3 reflectance(0.0);
   for (const auto& side : sides_) {

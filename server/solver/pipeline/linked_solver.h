@@ -150,6 +150,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] ShootersAndLights shootersAndLights() const { return {system_, lights_, sources_, crowds_}; }
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
+  void findImages();
   [[nodiscard]] bool settle();
   enum class Unshot { kNotByRays, kByRaysToo };
   void findUnshot(Unshot which = Unshot::kNotByRays);
@@ -191,6 +192,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double inMirrors() const;
   [[nodiscard]] std::vector<glm::vec3> spreadLight() const;
   [[nodiscard]] std::array<double, 3> spreadFlux() const;
+  [[nodiscard]] std::array<double, 3> imagesThatLeave() const;
   void updateVariation();
   [[nodiscard]] bool withLeafLight(const std::function<bool(const LeafLight&)>& work) const;
   [[nodiscard]] bool wantsVariation() const;
@@ -212,6 +214,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> ofLeaves(const scene::SideColours& colours) const;
   [[nodiscard]] std::vector<glm::vec3> shiningOfLeaves() const;
   [[nodiscard]] std::vector<glm::vec3> lampsOfLeaves() const;
+  [[nodiscard]] std::vector<glm::vec3> imagedLamps() const;
   [[nodiscard]] LeftLight leftLight() const;
   [[nodiscard]] glm::dvec3 passedFlux(const Side& side) const;
   [[nodiscard]] glm::dvec3 passedFlux(const PassingLeaf& leaf) const;
@@ -254,6 +257,8 @@ class LinkedSolver final : public Solver {
   LinkPlanner planner_;
   std::shared_ptr<const LeafRays> leaf_rays_;      // of rays and paths; null: not asked for yet
   std::shared_ptr<const SpecularLeaves> mirrors_;  // null: none
+  ImagedLight::Lamps lamp_images_, source_images_;
+  float least_imaged_ = 0.0F;           // emission of the former, at least
   std::unique_ptr<LeafGather> gather_;  // of reflected light; null: lights, and what is bright, are not measured
   double sampled_alone_ = 0.0;          // error before the last round that brought samples and no rays; 0: none did
   double sample_goal_ = 0.0;            // sampling error that further samples of links shall reach; 0: none

@@ -104,6 +104,7 @@ void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& shooter : system_.shooters()) {
     if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
   }
+  findImages();
 }
 
 /// What enters the scene's box from it, whether it meets anything or not.

@@ -181,10 +181,20 @@ std::uint32_t LeafRays::leafAt(const Side& side, const glm::dvec2& texel) {
 bool LeafRays::passes(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction,
                       std::uint64_t key) const {
   const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
-  if (!surface.see_through) return false;
+  return surface.see_through && uniformFromKey(mixKeys(key, hit.triangle)) >= stoppedPart(hit, at, direction);
+}
+
+double LeafRays::stoppedPart(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction) const {
+  if (!patches_.surfaces[patches_.triangle_surface[hit.triangle]].see_through) return 1.0;
   const auto texel = texelAt(patches_.triangles[hit.triangle], at);
-  const float stopped = patches_.stoppedAt(hit.triangle, glm::vec2(texel), glm::vec3(direction));
-  return uniformFromKey(mixKeys(key, hit.triangle)) >= static_cast<double>(stopped);
+  return static_cast<double>(patches_.stoppedAt(hit.triangle, glm::vec2(texel), glm::vec3(direction)));
+}
+
+std::uint32_t LeafRays::litSideOf(const geometry::Hit& hit) const {
+  const auto surface = patches_.triangle_surface[hit.triangle];
+  const auto met = side_of_[surface][hit.front ? 0 : 1];
+  return met == scene::kNone && patches_.surfaces[surface].glass.mirrors_back ? side_of_[surface][hit.front ? 1 : 0]
+                                                                              : met;
 }
 
 void LeafRays::meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
@@ -220,9 +230,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       for (std::size_t i = 0; i < sheets; ++i) distance[i] = 0.0F;
       continue;
     }
-    const auto surface = patches_.triangle_surface[hit.triangle];
-    auto s = side_of_[surface][hit.front ? 0 : 1];
-    if (s == scene::kNone && patches_.surfaces[surface].glass.mirrors_back) s = side_of_[surface][hit.front ? 1 : 0];
+    auto s = litSideOf(hit);
     end = {at, {}, kNothing, hit.triangle};
     if (s == scene::kNone) return kNothing;
     auto texel = texelAt(patches_.triangles[hit.triangle], at);
@@ -270,6 +278,59 @@ bool LeafRays::isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3&
   const double length = glm::length(way);
   return length > kNearEnd &&
          rays_.open({glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd)});
+}
+
+double LeafRays::openPart(const Place& from, const glm::dvec3& to) const {
+  if (patches_.opacity.empty()) return isOpen(from, to) ? 1.0 : 0.0;
+  const glm::dvec3 origin = lifted(from), way = to - origin;
+  const double length = glm::length(way);
+  if (length <= kNearEnd) return 0.0;
+  const geometry::Ray ray{glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd),
+                          from.triangle};
+  std::array<std::uint32_t, kMostSheets> passed;
+  double part = 1.0;
+  for (std::size_t sheets = 0; sheets < kMostSheets; ++sheets) {
+    const auto hit = rays_.nearest(ray, std::span(passed).first(sheets));
+    if (!hit.found()) return part;
+    part *= 1.0 - stoppedPart(hit, origin + static_cast<double>(hit.t) * way / length, way);
+    if (part <= 0.0) return 0.0;
+    passed[sheets] = hit.triangle;
+  }
+  return 0.0;
+}
+
+LeafRays::Arrival LeafRays::arriveAt(const Place& from, const glm::dvec3& at) const {
+  const glm::dvec3 origin = lifted(from), way = at - origin;
+  const double length = glm::length(way);
+  if (length <= kNearEnd) return {};
+  const auto direction = way / length;
+  const geometry::Ray ray{glm::vec3(origin), glm::vec3(direction), static_cast<float>(length + kNearEnd),
+                          from.triangle};
+  std::array<std::uint32_t, kMostSheets> passed;
+  double part = 1.0;
+  for (std::size_t sheets = 0; sheets < kMostSheets; ++sheets) {
+    const auto hit = rays_.nearest(ray, std::span(passed).first(sheets));
+    if (!hit.found()) return {};
+    const auto there = origin + static_cast<double>(hit.t) * direction;
+    const double stopped = stoppedPart(hit, there, direction);
+    passed[sheets] = hit.triangle;
+    if (static_cast<double>(hit.t) < length - kNearEnd) {
+      part *= 1.0 - stopped;
+      if (part <= 0.0) return {};
+      continue;
+    }
+    const auto& frame = patches_.triangles[hit.triangle];
+    const auto texel = texelAt(frame, there);
+    const glm::dvec3 normal(hit.front ? frame.normal : -frame.normal);
+    Arrival arrival{part * stopped, {positionAt(frame, texel), normal, kNothing, hit.triangle}};
+    const auto s = litSideOf(hit);
+    if (s == scene::kNone) return arrival;
+    const auto value = leafAt(sides_[s], texel);
+    if (isBeneath(sides_[s], value)) continue;  // what covers it is met as well
+    arrival.end.value = standInOf(value);
+    return arrival;
+  }
+  return {};
 }
 
 glm::vec3 LeafRays::startOf(const Place& place) { return glm::vec3(lifted(place)); }

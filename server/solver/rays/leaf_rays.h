@@ -81,6 +81,14 @@ class LeafRays {
   /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`. `normal`: of the face on
   /// which that lies, which a way that grazes it must not meet before; zero: it lies on none.
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3& normal = glm::dvec3(0.0)) const;
+  /// The same where one can see through what lies between: part of the light that passes. `normal` is none.
+  [[nodiscard]] double openPart(const Place& from, const glm::dvec3& to) const;
+  /// What is seen of a surface at a point that lies on it.
+  struct Arrival {
+    double part = 0.0;  ///< of the light, that passes what lies before and is stopped there; 0: all is hidden
+    Place end;          ///< `value`: who stands for the leaf there, or kNothing where the surface is unlit
+  };
+  [[nodiscard]] Arrival arriveAt(const Place& from, const glm::dvec3& at) const;
   /// Where ways from a place begin: a little before it.
   [[nodiscard]] static glm::vec3 startOf(const Place& place);
   /// Points of a light, structure of arrays: geometry::kPacket after geometry::kPacket of them.
@@ -105,6 +113,9 @@ class LeafRays {
                std::span<std::uint32_t> passed, std::size_t sheets) const;
   [[nodiscard]] bool passes(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction,
                             std::uint64_t key) const;
+  [[nodiscard]] double stoppedPart(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction) const;
+  /// Number of the side that is lit where a ray meets it, or that stands for it; kNone: it is unlit.
+  [[nodiscard]] std::uint32_t litSideOf(const geometry::Hit& hit) const;
   /// The leaf of a side that a texel lies on, or the nearest, by value.
   [[nodiscard]] static std::uint32_t leafAt(const Side& side, const glm::dvec2& texel);
 

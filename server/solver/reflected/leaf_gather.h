@@ -15,7 +15,8 @@
 // the others the level of x, which rays know to a thousandth or so, is the one that makes it so.
 //
 // Of a ray that a mirror reflected the leaf at the mirror counts by itself, and what is seen in it times what the
-// mirror reflects: there shooters count as well, since what they send over links does not come by way of mirrors.
+// mirror reflects: there shooters count as well, since what they send over links does not come by way of mirrors. Lamps
+// in flat mirrors are looked for as images (ImagedLight), and not by those rays that would find them there.
 //
 // Two independent halves of the rays give two independent solutions; where their difference is worth
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
@@ -34,6 +35,7 @@
 #include "common/union_find.h"
 #include "server/solver/math/gmres.h"
 #include "server/solver/patches/passing.h"
+#include "server/solver/reflected/imaged_light.h"
 #include "server/solver/reflected/leaf_shading.h"
 #include "server/solver/reflected/leaf_sights.h"
 #include "server/solver/reflected/leaf_smoother.h"
@@ -49,11 +51,14 @@ struct LeftLight {
   std::vector<PassingLeaf> passing;                         ///< in their order
   std::shared_ptr<const SpecularLeaves> mirrors = nullptr;  ///< as of LeafGather::reflectBy()
   std::vector<glm::vec3> lamps;                             ///< emission of light polygons; empty: no mirror needs it
-  std::array<std::vector<glm::vec3>, 2> irradiance;         ///< over links, by half
-  std::array<std::vector<glm::vec3>, 2> shot;               ///< radiosity that shooters stand for, by half
-  std::array<glm::dvec3, 2> sky{};                          ///< pi times its radiance, above the horizon and below
-  std::vector<glm::vec3> sky_cells;                         ///< the same by cell of SkyCells, to be added; empty: none
-  double residual = 4e-4;                                   ///< that may be left, of all that is gathered
+  std::vector<glm::vec3> imaged_lamps;  ///< of it, of those of `lamp_images`; empty where there are none
+  /// In those mirrors: of some of `lamps`, and of lights that are no surfaces.
+  ImagedLight::Lamps lamp_images, source_images;
+  std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
+  std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
+  std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
+  std::vector<glm::vec3> sky_cells;                  ///< the same by cell of SkyCells, to be added; empty: none
+  double residual = 4e-4;                            ///< that may be left, of all that is gathered
 };
 
 class LeafGather {
@@ -92,8 +97,10 @@ class LeafGather {
   /// alone. Throws std::bad_alloc.
   void begin(LeftLight light);
   bool advance(double seconds);
-  /// Rays are asked for that are not traced: advance() will take its time.
-  [[nodiscard]] bool isBehind() const { return !sights_.isTraced(); }
+  /// Rays are asked for that are not traced, or looks at images: advance() will take its time.
+  [[nodiscard]] bool isBehind() const {
+    return !sights_.isTraced() || imaged_lamps_.isBehind() || imaged_sources_.isBehind();
+  }
   [[nodiscard]] std::uint64_t raysBehind() const { return sights_.untraced(); }
   /// Those are given up, where there are others.
   void giveUp() { sights_.giveUp(); }
@@ -127,6 +134,14 @@ class LeafGather {
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
   /// Flux that mirrors reflect, each time that they do, but for what leaves the scene as it came from it.
   [[nodiscard]] const std::array<double, 3>& mirroredFlux() const { return mirrored_flux_; }
+  /// Flux that mirrors reflect of images of lights that are no surfaces, as if they did so diffusely.
+  [[nodiscard]] const std::array<double, 3>& spreadFlux() const { return spread_; }
+  /// Square of the noise of images of lamps, as noise().
+  [[nodiscard]] double imageNoise() const { return image_noise_; }
+  /// Looks about so many times as often at each. False: there can be no more.
+  bool refineImages(double times);
+  /// Flux that leaves get of such images.
+  [[nodiscard]] const std::array<double, 3>& imagedFlux() const { return imaged_flux_; }
   /// Flux that comes straight from the sky, or by way of mirrors.
   [[nodiscard]] const std::array<double, 3>& skyFlux() const { return from_sky_; }
 
@@ -177,6 +192,9 @@ class LeafGather {
     std::vector<Light32> mirrored;  ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
     std::vector<float> at_glass;    ///< by leaf: the part of its rays that meet glass first; empty: none does
     std::vector<Light32> shot;      ///< by leaf, what only those in mirrors see: lamps, and what shooters send
+    /// By leaf: what of that arrives by rays; and what arrives of images. Empty: nothing.
+    std::vector<Light32> in_mirrors;
+    std::vector<glm::vec3> imaged;
     RayGmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
@@ -211,6 +229,13 @@ class LeafGather {
   [[nodiscard]] std::vector<Light32> reflectedOf(std::size_t half, const Met& met) const;
   void takeMirrors(std::size_t half);
   [[nodiscard]] bool takesLight(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] bool isImaged(const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 imagedIn(const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 arrivesAsImage(std::size_t half, std::uint32_t lamp, const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 imagedAt(std::size_t half, std::uint32_t end) const;
+  void takeImages();
+  void spreadImages();
+  void tellImages();
   [[nodiscard]] double atGlass(std::size_t half, std::size_t value) const {
     return halves_[half].at_glass.empty() ? 0.0 : static_cast<double>(halves_[half].at_glass[value]);
   }
@@ -224,6 +249,11 @@ class LeafGather {
     if (halves_[half].mirrored.empty()) return {};
     const auto& mirrored = halves_[half].mirrored[value];
     return {mirrored[0], mirrored[1], mirrored[2], 0.0};
+  }
+  [[nodiscard]] Light inMirrorsAt(std::size_t half, std::size_t value) const {
+    if (halves_[half].in_mirrors.empty()) return {};
+    const auto& light = halves_[half].in_mirrors[value];
+    return {light[0], light[1], light[2], 0.0};
   }
   [[nodiscard]] Light shotOf(std::size_t half, std::size_t value) const {
     if (halves_[half].shot.empty()) return {};
@@ -297,6 +327,7 @@ class LeafGather {
   void finish();
 
   LeafSights sights_;
+  ImagedLight imaged_lamps_, imaged_sources_;
   std::size_t most_bytes_;
   bool has_gathered_ = false, lacks_memory_ = false, has_mirrors_ = false;
   const std::vector<Side>& sides_;
@@ -353,12 +384,13 @@ class LeafGather {
   /// Of the rays that there are light was weighed for shading normals; what they count for that is kept.
   bool has_shaded_ = false, keeps_shaded_rays_ = false;
   std::array<std::vector<ShadedRays>, 2> shaded_rays_;  ///< by half, by side of LeafShading::sides()
-  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
+  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, image_noise_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0,
+         unsolved_square_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::vector<double> block_light_;  ///< likewise, of all irradiance
   std::vector<double> side_noise_, side_light_;  ///< likewise, by side
   std::vector<float> leaf_bias_;
-  std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{}, mirrored_flux_{};
+  std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{}, mirrored_flux_{}, spread_{}, imaged_flux_{};
 };
 
 }  // namespace radiosity::solver

@@ -264,13 +264,12 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
       const auto lost = lostOf(h, v);
       const auto sky = skyAt(h, v, lost);
       const double sends = 1.0 - lost.all() - atGlass(h, v), taken = this->taken(v);
-      const auto mirrored = mirroredAt(h, v), only_in_mirrors = shotOf(h, v);
+      const auto mirrored = mirroredAt(h, v), in_mirrors = inMirrorsAt(h, v);
       auto& source = halves_[h].source[v];
       for (std::size_t c = 0; c < 4; ++c) {
         source[c] += emission[c] + reflectance[c] * over_links[c] - shot[c];
-        const double in_mirrors = mirrored[c] * only_in_mirrors[c];
-        sum.shining[c] += area * (std::abs(source[c]) + taken * sky[c] + std::abs(in_mirrors));
-        sum.arrives[c] += area * ((sends + mirrored[c]) * source[c] + taken * sky[c] + in_mirrors);
+        sum.shining[c] += area * (std::abs(source[c]) + taken * sky[c] + std::abs(in_mirrors[c]));
+        sum.arrives[c] += area * ((sends + mirrored[c]) * source[c] + taken * sky[c] + in_mirrors[c]);
         sum.takes[c] += area * (taken - (sends + mirrored[c]) * reflectance[c]);
       }
       sum.area += area;
@@ -382,12 +381,12 @@ RADIOSITY_CLONES void LeafGather::addLevels(std::size_t h, std::span<LevelSum> s
       const auto lost = lostOf(h, v);
       const auto sky = skyAt(h, v, lost);
       const auto& loss = lossOf(h, v);
-      const auto mirrored = mirroredAt(h, v), only_in_mirrors = shotOf(h, v);
+      const auto mirrored = mirroredAt(h, v), in_mirrors = inMirrorsAt(h, v);
       const double at_glass = atGlass(h, v), taken = this->taken(v);
       for (std::size_t c = 0; c < 4; ++c) {
         const double sends = 1.0 - loss[c] * lost.all() - at_glass + mirrored[c];
         const double stays = area * (taken - sends * reflectance[c]);
-        sum.left[c] += area * (sends * source[c] + taken * sky[c] + mirrored[c] * only_in_mirrors[c]);
+        sum.left[c] += area * (sends * source[c] + taken * sky[c] + in_mirrors[c]);
         sum.kept[c] += stays * x[c];
         sum.size[c] += stays * std::abs(x[c]);
         sum.all[c] += stays * (x[c] + over_links[c]);

@@ -1,4 +1,5 @@
 // LeafGather and mirrors: what rays see in them, and what of the light of leaves arrives by way of them.
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include "server/solver/math/halves.h"
@@ -8,6 +9,10 @@ namespace radiosity::solver {
 namespace {
 
 constexpr std::array<float, 4> kWhite{1.0F, 1.0F, 1.0F, 0.0F};
+
+void add(std::array<float, 4>& sum, const std::array<float, 4>& light) {
+  for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
+}
 
 /// Calls visit(leaf value, end, part of the leaf's rays) for each ray of a half.
 template <typename Visit>
@@ -74,9 +79,107 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
     }
     const auto mirror = SpecularStep::of(step.by);
     const auto tint = tintOf(step);
-    const auto shot = source != nullptr ? shotAt(half, step.next) : Light32{};
     light = mirror.is_again ? Light32{} : radiosity[mirror.leaf];
-    for (std::size_t c = 0; c < 3; ++c) light[c] += tint[c] * (next[c] + shot[c]);
+    Light32 met = next, not_here{};
+    if (source != nullptr) {
+      add(met, shotAt(half, step.next));
+      add(met, imagedAt(half, step.next));
+      not_here = imagedIn(step);
+    }
+    for (std::size_t c = 0; c < 3; ++c) light[c] += tint[c] * met[c] - not_here[c];
+  }
+}
+
+/// Lamps that are seen in the mirror of a step are looked for as images.
+bool LeafGather::isImaged(const LeafSights::Step& step) const {
+  const auto* images = imaged_lamps_.images();
+  if (images == nullptr || !SpecularStep::is(step.by)) return false;
+  const auto mirror = SpecularStep::of(step.by);
+  return !mirror.is_again && images->isIn(mirror.leaf);
+}
+
+/// Of a step: light of a lamp that the ray found in a mirror and that leaves get as an image, without the ray.
+LeafGather::Light32 LeafGather::imagedIn(const LeafSights::Step& step) const {
+  if (step.next >= sights_.leafCount() || !isImaged(step)) return {};
+  const auto tint = tintOf(step);
+  const auto& lamp = light_.imaged_lamps[step.next];
+  return {tint[0] * lamp.x, tint[1] * lamp.y, tint[2] * lamp.z, 0.0F};
+}
+
+/// Of the first step of a ray that is drawn as a lamp's light leaves it: what of that arrives next, as of an image.
+LeafGather::Light32 LeafGather::arrivesAsImage(std::size_t half, std::uint32_t lamp,
+                                               const LeafSights::Step& step) const {
+  if (!isImaged(step) || !takesLight(half, step.next)) return {};
+  const auto tint = tintOf(step);
+  const auto& light = light_.imaged_lamps[lamp];
+  return {tint[0] * light.x, tint[1] * light.y, tint[2] * light.z, 0.0F};
+}
+
+/// The same of where a ray ends, or goes on: who sees that in another mirror gets no image of it.
+LeafGather::Light32 LeafGather::imagedAt(std::size_t half, std::uint32_t end) const {
+  return end >= sights_.endCount() ? imagedIn(sights_.steps(half)[end - sights_.endCount()]) : Light32{};
+}
+
+/// What arrives of images, which is like light over links from then on.
+void LeafGather::takeImages() {
+  for (auto& half : halves_) half.imaged.clear();
+  spread_ = imaged_flux_ = {};
+  image_noise_ = 0.0;
+  if (imaged_lamps_.images() == nullptr && imaged_sources_.images() == nullptr) return;
+  for (auto& half : halves_) half.imaged.assign(sights_.leafCount(), glm::vec3(0.0F));
+  inBothHalves([&](std::size_t h) { imaged_sources_.addTo(h, halves_[h].imaged); });
+  spreadImages();
+  inBothHalves([&](std::size_t h) {
+    auto& imaged = halves_[h].imaged;
+    imaged_lamps_.addTo(h, imaged);
+    for (std::uint32_t v = 0; v < imaged.size(); ++v) {
+      if (light_.mirrors->isGlass(v)) imaged[v] = glm::vec3(0.0F);
+      light_.irradiance[h][v] += imaged[v];
+    }
+  });
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    const auto off = 0.5F * (halves_[0].imaged[v] - halves_[1].imaged[v]);
+    image_noise_ += areaOf(v) * static_cast<double>(glm::dot(off, off));
+  }
+}
+
+bool LeafGather::refineImages(double times) {
+  const bool more_lamps = imaged_lamps_.refine(times);
+  return imaged_sources_.refine(times) || more_lamps;
+}
+
+/// Of lights that are no surfaces rays find nothing, and no image is seen in another mirror: that reflects them as if
+/// it did so diffusely.
+void LeafGather::spreadImages() {
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    const auto arrives = 0.5F * (halves_[0].imaged[v] + halves_[1].imaged[v]);
+    for (std::size_t c = 0; c < 3; ++c)
+      imaged_flux_[c] += areaOf(v) * static_cast<double>(arrives[static_cast<int>(c)]);
+    if (!light_.mirrors->has(v) || light_.mirrors->isGlass(v)) continue;
+    const auto light = light_.mirrors->meanReflectance(v) * arrives;
+    light_.emission[v] += light;
+    for (std::size_t c = 0; c < 3; ++c) spread_[c] += areaOf(v) * static_cast<double>(light[static_cast<int>(c)]);
+  }
+}
+
+/// Adds it to what rays bring, and to what of that counts for shading normals.
+void LeafGather::tellImages() {
+  for (std::size_t h = 0; h < 2; ++h) {
+    const auto& imaged = halves_[h].imaged;
+    auto& parts = shaded_part_[h];
+    std::vector<glm::vec3> shaded(parts.size(), glm::vec3(0.0F));
+    imaged_lamps_.addShadedTo(h, shaded);
+    imaged_sources_.addShadedTo(h, shaded);
+    for (std::uint32_t v = 0; v < imaged.size(); ++v) {
+      const auto of_rays = gathered_[h][v];
+      gathered_[h][v] += imaged[v];
+      const auto number = shaded.empty() ? scene::kNone : shading_->numberOf(v);
+      if (number == scene::kNone || imaged[v] == glm::vec3(0.0F)) continue;
+      for (int c = 0; c < 3; ++c) {
+        if (gathered_[h][v][c] > 0.0F)
+          parts[number][c] = (parts[number][c] * of_rays[c] + shaded[number][c]) / gathered_[h][v][c];
+      }
+    }
   }
 }
 
@@ -96,6 +199,7 @@ bool LeafGather::takesLight(std::size_t half, std::uint32_t end) const {
 void LeafGather::takeMirrors(std::size_t h) {
   auto& half = halves_[h];
   half.mirrored.clear();
+  half.in_mirrors.clear();
   half.shot.clear();
   half.at_glass.clear();
   if (!light_.mirrors) return;
@@ -107,12 +211,18 @@ void LeafGather::takeMirrors(std::size_t h) {
   }
   const auto arrives = reflectedOf(h, [&](std::uint32_t end) { return takesLight(h, end) ? kWhite : Light32{}; });
   half.mirrored.resize(leaves);
+  half.in_mirrors.resize(leaves);
   if (light_.mirrors->hasGlass()) half.at_glass.resize(leaves);
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
     const auto first = end >= ends ? LeafSights::leafOf(sights_.steps(h)[end - ends]) : end;
     if (first < leaves && light_.mirrors->isGlass(first)) half.at_glass[v] += part;
     if (end < ends) return;
-    for (std::size_t c = 0; c < 3; ++c) half.mirrored[v][c] += part * arrives[end - ends][c];
+    const auto imaged = arrivesAsImage(h, v, sights_.steps(h)[end - ends]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float by_mirror = part * arrives[end - ends][c];
+      half.mirrored[v][c] += by_mirror;
+      half.in_mirrors[v][c] += by_mirror * half.shot[v][c] - part * imaged[c];
+    }
   });
   takeMirroredSky(h);
 }
@@ -149,6 +259,10 @@ void LeafGather::weighMirrors() {
   if (!light_.mirrors) return;
   const auto ends = sights_.endCount();
   for (std::size_t h = 0; h < 2; ++h) {
+    for (std::size_t v = 0; v < halves_[h].imaged.size(); ++v) {
+      for (std::size_t c = 0; c < 3; ++c)
+        mirrored_flux_[c] += 0.5 * areaOf(v) * static_cast<double>(halves_[h].imaged[v][static_cast<int>(c)]);
+    }
     const auto& radiosity = halves_[h].radiosity;
     const auto to_sky = reflectedOf(h, [&](std::uint32_t end) { return sights_.isSky(end) ? kWhite : Light32{}; });
     const auto unlit = reflectedOf(h, [&](std::uint32_t end) { return sights_.isAbsorbed(end) ? kWhite : Light32{}; });

@@ -88,6 +88,7 @@ class LeafSights {
     return (is_short_ || end >= endCount()) && endsInDoubt(half, end);
   }
 
+  [[nodiscard]] const std::shared_ptr<const LeafRays>& rays() const { return rays_; }
   /// Index of the side of a leaf.
   [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_->indexOfSide(value); }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "common/parallel.h"
 #include "common/task.h"
@@ -11,6 +12,7 @@
 #include "server/solver/math/microfacets.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/rays/ray_order.h"
 
 namespace radiosity::solver {
@@ -80,11 +82,22 @@ void PlaceLight::takeMirrors(const scene::PatchMaterials& materials) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       lamp_emission_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
   }
+  const auto find = [&](std::span<const LightPolygon> lamps, std::span<const PunctualLights::Source> sources) {
+    return Images{LampImages::find(patches_, *sides_, rays_, mirrors_, lamps, sources),
+                  LampImages::lightOf(lamps, sources)};
+  };
+  const auto areas = leafAreas(patches_, *sides_);
+  least_imaged_ = LampImages::leastEmission(lamps_, std::reduce(areas.begin(), areas.end(), 0.0));
+  std::vector<LightPolygon> bright;
+  std::ranges::copy_if(lamps_, std::back_inserter(bright),
+                       [&](const LightPolygon& lamp) { return channelSum(lamp.emission) > least_imaged_; });
+  lamp_images_ = find(bright, {});
+  source_images_ = find({}, sources_);
   if (!sources_.empty()) spreadSources();
 }
 
-/// What rays do not find in mirrors leaves these as if it was diffuse (Solver::spreadByMirrors). A bounded number of
-/// leaves is asked; the others have what the one before them has.
+/// What is found in mirrors neither by rays nor as an image leaves these as if it was diffuse
+/// (Solver::spreadByMirrors). A bounded number of leaves is asked; the others have what the one before them has.
 void PlaceLight::spreadSources() {
   std::vector<std::uint32_t> spreading;
   for (const auto& side : *sides_) {
@@ -98,7 +111,10 @@ void PlaceLight::spreadSources() {
     interruptionPoint();
     const auto value = spreading[block * step];
     const auto draw = sobol4(0, mixKeys(kSpreadSeed, value));
-    const auto arrives = glm::vec3(fromSources(spotOn(value, {draw.x, draw.y}), mixKeys(kSpreadSeed + 1, value)));
+    const auto spot = spotOn(value, {draw.x, draw.y});
+    const auto key = mixKeys(kSpreadSeed + 1, value);
+    auto arrives = glm::vec3(fromImages(source_images_, spot, key, Looks::kFewer));
+    if (!source_images_.isIn(value)) arrives += glm::vec3(fromSources(spot, key));
     for (auto i = block * step; i < std::min(spreading.size(), (block + 1) * step); ++i)
       emission_[spreading[i]] += mirrors_->meanReflectance(spreading[i]) * arrives;
   });
@@ -196,7 +212,7 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
 }
 
 /// What a ray that met a mirror sees in it, beside the light of the mirror's own leaf. Lamps count in full there, since
-/// direct light does not come by way of mirrors.
+/// direct light does not come by way of mirrors, but for those that are looked for as images.
 glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
   glm::dvec3 sum(0.0), part(1.0);
   auto value = met.value;
@@ -207,13 +223,15 @@ glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
   for (std::size_t hop = 0; hop < SpecularLeaves::kMostHops && isMirror(); ++hop) {
     key = mixKeys(key, 7 + hop);
     const auto reflection = reflectByMicrofacets(end.normal, direction, mirrors_->roughness(value), key);
+    const bool is_imaged = hop == 0 && reflection.count == 1 && lamp_images_.isIn(value);
     for (const double edge : reflection.edges())
       part *= glm::dvec3(mirrors_->reflectance(value, static_cast<float>(edge)));
     direction = reflection.direction;
     const auto from = end;
     value = rays_->see(from, direction, key, end);
     sum += part * leaving(value, end, key, met.steps);
-    if (value < lamp_emission_.size()) sum += part * glm::dvec3(lamp_emission_[value]);
+    if (value >= lamp_emission_.size() || (is_imaged && channelSum(lamp_emission_[value]) > least_imaged_)) continue;
+    sum += part * glm::dvec3(lamp_emission_[value]);
   }
   return sum;
 }
@@ -236,7 +254,38 @@ glm::dvec3 PlaceLight::direct(const Spot& spot, std::uint64_t key, Looks looks) 
   for (std::size_t i = 0; i < lamps_.size(); ++i)
     sum += fromLamp(lamps_[i], spot, mixKeys(key, i), looks) * glm::dvec3(lamps_[i].emission);
   if (many_) sum += fromSomeLamps(spot, key);
+  if (lamp_images_.images) sum += fromImages(lamp_images_, spot, mixKeys(key, 5), looks);
+  if (source_images_.images) sum += fromImages(source_images_, spot, mixKeys(key, 6), looks);
   return sum + fromSources(spot, key);
+}
+
+/// By some points of each, as of lamps themselves.
+glm::dvec3 PlaceLight::fromImages(const Images& images, const Spot& spot, std::uint64_t key, Looks looks) const {
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; images.images && i < images.images->images().size(); ++i) {
+    const auto& image = images.images->images()[i];
+    if (!images.images->maySee(image, spot.place.position, 0.0)) continue;
+    const auto of_image = mixKeys(key, i);
+    const Sobol4 draws(of_image);
+    LampImages::Looks some;
+    const auto look = [&](std::uint32_t first, std::uint32_t end) {
+      for (auto k = first; k < end; ++k) {
+        const auto at = draws(k);
+        some.add(images.images->look(image, spot.place, spot.shading, {at.x, at.y}));
+      }
+      return some.irradiance();
+    };
+    const auto light = glm::dvec3(images.light[image.lamp]);
+    const auto first = look(0, kFirstLooks);
+    const bool agree = some.seesAll() || some.seesNothing();
+    if (looks == Looks::kFewer && agree && uniformFromKey(of_image) >= kAskAgain) {
+      sum += light * first;
+      continue;
+    }
+    const auto all = look(kFirstLooks, kAllLooks);
+    sum += light * (looks == Looks::kFewer && agree ? first + (all - first) / kAskAgain : all);
+  }
+  return sum;
 }
 
 glm::dvec3 PlaceLight::fromSources(const Spot& spot, std::uint64_t key) const {

@@ -14,6 +14,7 @@
 
 #include "server/scene/shading/shading_normals.h"
 #include "server/scene/values/patch_scene.h"
+#include "server/solver/lamps/lamp_images.h"
 #include "server/solver/lamps/light_tree.h"
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/lamps/sky_sources.h"
@@ -83,6 +84,8 @@ class PlaceLight {
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
 
  private:
+  /// How many points of a lamp look: all, or fewer where the first agree.
+  enum class Looks { kAll, kFewer };
   struct Gathered {
     glm::dvec3 light{0.0}, off{0.0};
   };
@@ -97,13 +100,18 @@ class PlaceLight {
   };
   [[nodiscard]] glm::dvec3 alongMirrors(const Met& met) const;
   void takeMirrors(const scene::PatchMaterials& materials);
+  /// Lamps of one kind in flat mirrors, and what they shine with.
+  struct Images {
+    std::shared_ptr<const LampImages> images;  ///< null: none
+    std::vector<glm::vec3> light;
+    [[nodiscard]] bool isIn(std::uint32_t value) const { return images && images->isIn(value); }
+  };
+  [[nodiscard]] glm::dvec3 fromImages(const Images& images, const Spot& spot, std::uint64_t key, Looks looks) const;
   void spreadSources();
   [[nodiscard]] glm::dvec3 fromSources(const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] glm::dvec3 reflectedBy(const Spot& spot, std::uint64_t key, std::size_t steps) const;
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
-  /// How many points of a lamp look: all, or fewer where the first agree.
-  enum class Looks { kAll, kFewer };
   [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] double fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
   [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const;
@@ -130,6 +138,8 @@ class PlaceLight {
   std::vector<glm::vec3> off_;     ///< what radiosity_ is off by; empty: not known
   std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
   std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
+  Images lamp_images_, source_images_;
+  float least_imaged_ = 0.0F;  ///< emission of lamps of the former, at least
 };
 
 }  // namespace radiosity::solver

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
@@ -83,6 +84,12 @@ std::vector<LeafAt> wholeLeaves(const Solve& solve) {
   return leaves;
 }
 
+scene::ChartOptions texelsOf(double metres) {
+  scene::ChartOptions charts;
+  charts.texel_size_m = metres;
+  return charts;
+}
+
 /// Of all light, relative RMS against the path tracer at every `step`-th whole leaf, but for the tracer's own noise.
 double offFromPathTracer(const Solve& solve, const TestScene& scene, std::size_t step, std::uint32_t samples) {
   const auto leaves = wholeLeaves(solve);
@@ -125,8 +132,26 @@ TEST_P(MirrorFurnace, KeepsItsLightAroundAWhiteMirror) {
 INSTANTIATE_TEST_SUITE_P(Roughness, MirrorFurnace, testing::Values(0.0, 0.3, 0.7, 1.0),
                          [](const auto& info) { return std::to_string(std::lround(info.param * 10.0)); });
 
+enum class LampKind { kSurface, kPoint, kSpot, kBall, kRectangle };
+
+/// Hangs in one half of the box; `side`: 1, or -1 in the mirror image of that.
+test_scenes::Light lightOf(LampKind kind, double side) {
+  using Kind = test_scenes::Light::Kind;
+  test_scenes::Light light;
+  light.position = {side, 1.75, 1.0};
+  light.intensity = glm::dvec3(10.0);
+  if (kind == LampKind::kBall) light.radius_m = 0.1;
+  if (kind == LampKind::kSpot || kind == LampKind::kRectangle) {
+    light.kind = kind == LampKind::kSpot ? Kind::kSpot : Kind::kRectangle;
+    light.target = {side * 0.2, 0.5, 0.9};  // at the mirror
+    light.width_m = light.height_m = 0.4;
+    light.outer_cone_rad = 0.9;
+  }
+  return light;
+}
+
 /// The half of a room that lies before a mirror, or all of it. A lamp hangs in each half.
-TestScene box(bool is_doubled) {
+TestScene box(bool is_doubled, LampKind kind) {
   TestScene scene;
   scene.name = is_doubled ? "doubled_box" : "mirrored_box";
   const auto white = scene.add({"white", glm::dvec3(0.7, 0.6, 0.5), {}});
@@ -136,21 +161,29 @@ TestScene box(bool is_doubled) {
   Object room{"room", {}, {}};
   appendBox(room, {is_doubled ? -2.0 : 0.0, 0, 0}, {2, 2, 2},
             {is_doubled ? red : glass, red, white, white, white, white}, test_scenes::kNoFace, true);
-  scene.objects = {room, test_scenes::makeCeilingLamp("lamp", {1.0, 1.8, 1.0}, 0.6, 0.6, white, light)};
-  if (is_doubled)
-    scene.objects.push_back(test_scenes::makeCeilingLamp("other", {-1.0, 1.8, 1.0}, 0.6, 0.6, white, light));
+  scene.objects = {room};
+  for (const double side : {1.0, -1.0}) {
+    if (side < 0.0 && !is_doubled) break;
+    const auto name = side > 0.0 ? "lamp" : "other";
+    if (kind == LampKind::kSurface) {
+      scene.objects.push_back(test_scenes::makeCeilingLamp(name, {side, 1.8, 1.0}, 0.6, 0.6, white, light));
+    } else {
+      scene.lights.push_back(lightOf(kind, side));
+    }
+  }
   return scene;
 }
 
 /// Texels of a size that divides the room, so that both boxes have the same.
-Loaded loadBox(bool is_doubled) {
-  scene::ChartOptions charts;
-  charts.texel_size_m = 0.1;
-  return loadGlb(test_scenes::encodeGlb(box(is_doubled)), charts);
+Loaded loadBox(bool is_doubled, LampKind kind) {
+  return loadGlb(test_scenes::encodeGlb(box(is_doubled, kind)), texelsOf(0.1));
 }
 
-TEST(Mirrors, ABoxWithAMirrorIsLitAsTheDoubledBox) {
-  Solve mirrored(loadBox(false), settingsOf(0.01)), doubled(loadBox(true), settingsOf(0.005));
+class MirroredBox : public testing::TestWithParam<std::pair<std::string, LampKind>> {};
+
+TEST_P(MirroredBox, IsLitAsTheDoubledBox) {
+  const auto kind = GetParam().second;
+  Solve mirrored(loadBox(false, kind), settingsOf(0.01)), doubled(loadBox(true, kind), settingsOf(0.005));
   EXPECT_TRUE(mirrored.run());
   EXPECT_TRUE(doubled.run());
   expectSound(mirrored);
@@ -176,6 +209,57 @@ TEST(Mirrors, ABoxWithAMirrorIsLitAsTheDoubledBox) {
   EXPECT_GT(matched, 1500U);
   EXPECT_NEAR(sum / sum_other, 1.0, 0.005);
   EXPECT_LT(std::sqrt(square / all), 0.02);
+  EXPECT_EQ(mirrored.solver().spreadByMirrors(), 0.0) << "every lamp is seen in the mirror";
+}
+
+INSTANTIATE_TEST_SUITE_P(Lamp, MirroredBox,
+                         testing::Values(std::pair("surface", LampKind::kSurface), std::pair("point", LampKind::kPoint),
+                                         std::pair("spot", LampKind::kSpot), std::pair("ball", LampKind::kBall),
+                                         std::pair("rectangle", LampKind::kRectangle)),
+                         [](const auto& info) { return info.param.first; });
+
+/// A black floor before a mirror two metres high, with the sun behind whoever looks into it.
+TestScene floorBeforeMirror(const glm::dvec3& colour, double angle_deg) {
+  TestScene scene;
+  scene.name = "sun_in_mirror";
+  const auto black = scene.add({"black", glm::dvec3(0.0), {}});
+  const auto metal = scene.add(mirror(0.0, colour));
+  Object floor{"floor", {}, {}}, wall{"wall", {}, {}};
+  floor.polygons = {{{{0, 0, 4}, {6, 0, 4}, {6, 0, -4}, {0, 0, -4}}, black}};
+  wall.polygons = {{{{0, 0, 4}, {0, 0, -4}, {0, 2, -4}, {0, 2, 4}}, metal}};
+  scene.objects = {floor, wall};
+  test_scenes::Light sun;
+  sun.kind = test_scenes::Light::Kind::kDirectional;
+  sun.target = {-1.0, -1.0, 0.0};
+  sun.intensity = glm::dvec3(100.0);
+  sun.angle_deg = angle_deg;
+  scene.lights.push_back(sun);
+  return scene;
+}
+
+// The sun's image lights the floor as far as the mirror reaches: two metres, at 45 degrees.
+TEST(Mirrors, TheSunLightsTheFloorBeforeAMirrorTwice) {
+  const glm::dvec3 gold(1.0, 0.75, 0.35);
+  for (const double angle_deg : {0.0, 0.5}) {
+    Solve solve(loadGlb(test_scenes::encodeGlb(floorBeforeMirror(gold, angle_deg)), texelsOf(0.125)),
+                settingsOf(0.005));
+    (void)solve.run();  // a black floor reflects nothing, so that there may be nothing left to refine
+    const double once = 100.0 * std::sqrt(0.5), edge = std::pow(1.0 - std::sqrt(0.5), 5.0);
+    std::size_t before = 0, beyond = 0;
+    for (const auto& leaf : wholeLeaves(solve)) {
+      if (leaf.middle.y > 0.01 || std::abs(leaf.middle.z) > 3.5) continue;
+      const bool is_near = leaf.middle.x < 1.9;
+      if (!is_near && leaf.middle.x < 2.1) continue;
+      const auto twice = once * (1.0 + gold + (1.0 - gold) * edge);
+      const auto truth = is_near ? twice : glm::dvec3(once);
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(leaf.light[c], truth[c], 0.002 * truth[c]) << leaf.middle.x;
+      ++(is_near ? before : beyond);
+    }
+    EXPECT_GT(before, 500U);
+    EXPECT_GT(beyond, 500U);
+    const auto energy = solve.solver().energy();
+    EXPECT_LT(std::abs(energy.imbalance[0]) / energy.emitted[0], 0.01) << "what passes by the floor leaves";
+  }
 }
 
 /// A room with this on one wall, and a block of it.
@@ -195,7 +279,7 @@ class RoomWith : public testing::TestWithParam<std::pair<std::string, Material>>
 TEST_P(RoomWith, IsLitAsThePathTracerHasIt) {
   const auto scene = roomWith(GetParam().second);
   Solve solve(load(scene, 4000), settingsOf(0.01));
-  EXPECT_TRUE(solve.run());
+  EXPECT_TRUE(solve.run()) << "error " << solve.solver().error().total;
   expectSound(solve);
   EXPECT_LT(offFromPathTracer(solve, scene, 9, 16384), 0.025);
 }
@@ -281,12 +365,6 @@ double meanOnFloor(const Solve& solve) {
   return sum / static_cast<double>(count);
 }
 
-scene::ChartOptions texelsOf(double metres) {
-  scene::ChartOptions charts;
-  charts.texel_size_m = metres;
-  return charts;
-}
-
 TEST_P(Glass, PassesOfLightFromAllAroundWhatFresnelLeaves) {
   Solve solve(loadGlb(test_scenes::encodeGlb(floorBelow(glass(GetParam()), true)), texelsOf(0.25)), settingsOf(0.005));
   EXPECT_TRUE(solve.run());
@@ -338,27 +416,60 @@ TEST_P(Glass, ThatIsABulbLetsItsLampLightTheRoom) {
 INSTANTIATE_TEST_SUITE_P(Face, Glass, testing::Bool(),
                          [](const auto& info) { return info.param ? "OfTwoSides" : "OfOneSide"; });
 
-// Rays do not meet a lamp without size in mirrors: what these reflect of it leaves them all the same.
-TEST(Mirrors, LightOfALampWithoutSizeIsNotLost) {
+/// With a lamp without size and a white mirror, of this shape.
+TestScene pointAndMirror(const std::function<void(Object&, std::uint32_t)>& appendMirror) {
   TestScene scene;
   scene.name = "point_and_mirror";
   const auto grey = scene.add({"grey", glm::dvec3(0.5), {}});
   const auto white = scene.add(mirror());
   Object room{"room", {}, {}}, block{"block", {}, {}};
   appendBox(room, {0, 0, 0}, {2, 2, 2}, test_scenes::allFaces(grey), test_scenes::kNoFace, true);
-  appendBox(block, {0.4, 0.3, 0.4}, {1.0, 1.0, 1.2}, test_scenes::allFaces(white));
+  appendMirror(block, white);
   scene.objects = {room, block};
   test_scenes::Light lamp;
   lamp.position = {1.3, 1.6, 1.0};
   lamp.intensity = glm::dvec3(100.0);
   scene.lights.push_back(lamp);
+  return scene;
+}
+
+/// Nothing leaves the room, and a white mirror keeps nothing: all is absorbed by the walls. Returns the part of the
+/// light that mirrors spread.
+double spreadOf(const TestScene& scene) {
   Solve solve(load(scene, 4000), settingsOf(0.01));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   const auto energy = solve.solver().energy();
-  // Nothing leaves the room, and a white mirror keeps nothing: all is absorbed by the walls.
   EXPECT_NEAR(energy.absorbed[0] / energy.emitted[0], 1.0, 0.01);
-  EXPECT_GT(solve.solver().spreadByMirrors() / (3.0 * energy.emitted[0]), 0.03) << "this scene is to test something";
+  return solve.solver().spreadByMirrors() / (3.0 * energy.emitted[0]);
+}
+
+// Rays do not meet a lamp without size in mirrors, and round ones have no image: what they reflect of it leaves them
+// all the same.
+TEST(Mirrors, LightOfALampWithoutSizeIsNotLost) {
+  const auto ball = [](Object& object, std::uint32_t white) {
+    appendSphere(object, {0.7, 0.7, 0.8}, 0.4, 2, white, false);
+  };
+  EXPECT_GT(spreadOf(pointAndMirror(ball)), 0.03) << "this scene is to test something";
+}
+
+// Of a block each face has an image, and none is seen in another.
+TEST(Mirrors, FacesOfABlockShowALampWithoutSize) {
+  const auto block = [](Object& object, std::uint32_t white) {
+    appendBox(object, {0.4, 0.3, 0.4}, {1.0, 1.0, 1.2}, test_scenes::allFaces(white));
+  };
+  EXPECT_EQ(spreadOf(pointAndMirror(block)), 0.0);
+}
+
+// What comes from one mirror to another is spread there.
+TEST(Mirrors, FacingEachOtherLoseNoLightOfALampWithoutSize) {
+  const auto pair = [](Object& object, std::uint32_t white) {
+    appendBox(object, {0.4, 0.3, 0.4}, {0.5, 1.5, 1.6}, test_scenes::allFaces(white));
+    appendBox(object, {1.7, 0.3, 0.4}, {1.8, 1.5, 1.6}, test_scenes::allFaces(white));
+  };
+  const double spread = spreadOf(pointAndMirror(pair));
+  EXPECT_GT(spread, 0.01);
+  EXPECT_LT(spread, 0.2) << "most of the light comes by way of one mirror alone";
 }
 
 }  // namespace
