@@ -3,8 +3,8 @@
     blender --background --factory-startup --python cycles_bake.py -- LIT.glb FOLDER [--seconds T] [--page-sizes WxH,...]
 
 Runs inside Blender (made with 3.4). The same triangles, TEXCOORD_1 and reflectances as the GLB has, and the same
-physics as the project's conventions: a plain Diffuse BSDF; the back of a single-sided triangle is black and does not
-shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
+physics as the project's conventions: a plain Diffuse BSDF, a Principled one for metal, Translucent for paper, Transparent
+and Glossy for glass; the back of a single-sided triangle is black and does not shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
 
 Sample counts grow by four for as long as the next bake should take at most T seconds. For each, every page is written as
 FOLDER/<samples>.<page>.pfm (irradiance in lux, row 0 = v 0) and a line "bake: {JSON}" is printed: samples, seconds (of
@@ -97,50 +97,117 @@ class Glb:
         return tuple(float(channel) for channel in colours[0])
 
 
-def light_and_reflectance(gltf, index):
-    """(reflectance RGB, luminance RGB in nits, double-sided) as the project's conventions say."""
-    material = gltf["materials"][index] if index is not None else {}
-    pbr = material.get("pbrMetallicRoughness", {})
-    transmits = "KHR_materials_transmission" in material.get("extensions", {})
-    if "baseColorTexture" in pbr or "emissiveTexture" in material or material.get("alphaMode", "OPAQUE") != "OPAQUE" or transmits:
-        raise ValueError("textures and surfaces that let light through are not baked")
-    colour = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1))[:3], float)
-    reflectance = np.minimum(colour * (1 - pbr.get("metallicFactor", 1.0)), 0.999)
-    strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
-    return reflectance, strength * np.array(material.get("emissiveFactor", (0, 0, 0)), float), material.get("doubleSided", False)
+class Material:
+    """What the project's conventions make of a material, or of none."""
+
+    def __init__(self, gltf, index, colour):
+        material = gltf["materials"][index] if index is not None else {"pbrMetallicRoughness": {"metallicFactor": 0}}
+        extensions = material.get("extensions", {})
+        pbr = material.get("pbrMetallicRoughness", {})
+        if "baseColorTexture" in pbr or "emissiveTexture" in material or "metallicRoughnessTexture" in pbr:
+            raise ValueError("textures are not baked")
+        if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+            raise ValueError("surfaces with holes are not baked")
+        base = np.minimum(np.array(pbr.get("baseColorFactor", (1, 1, 1, 1))[:3], float) * colour, 0.999)
+        metallic = pbr.get("metallicFactor", 1.0)
+        if 0 < metallic < 1:
+            raise ValueError("half metals are not baked")
+        self.is_metal = metallic == 1
+        self.is_glass = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0
+        if self.is_glass and (extensions["KHR_materials_transmission"]["transmissionFactor"] < 1 or max(base) - min(base) > 1e-3):
+            raise ValueError("only glass without colour is baked that passes all that it does not reflect")
+        self.base, self.roughness = base, pbr.get("roughnessFactor", 1.0)
+        paper = extensions.get("KHR_materials_diffuse_transmission", {})
+        passing = paper.get("diffuseTransmissionFactor", 0.0)
+        is_diffuse = not (self.is_metal or self.is_glass)
+        self.reflectance = is_diffuse * (1 - passing) * base
+        self.transmittance = is_diffuse * passing * np.array(paper.get("diffuseTransmissionColorFactor", (1, 1, 1)), float)
+        strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+        self.nits = strength * np.array(material.get("emissiveFactor", (0, 0, 0)), float)
+        self.double_sided = material.get("doubleSided", False) or self.is_glass
 
 
-def make_material(name, reflectance, nits, double_sided, image):
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    nodes, link = material.node_tree.nodes, material.node_tree.links.new
-    nodes.clear()
+class Shader:
+    """Puts nodes together."""
+
+    def __init__(self, name):
+        self.material = bpy.data.materials.new(name)
+        self.material.use_nodes = True
+        self.nodes, self.link = self.material.node_tree.nodes, self.material.node_tree.links.new
+        self.nodes.clear()
+
+    def bsdf(self, kind, colour, **inputs):
+        node = self.nodes.new(kind)
+        node.inputs[0].default_value = (*colour, 1)
+        for name, value in inputs.items():
+            node.inputs[name.replace("_", " ")].default_value = value
+        return node.outputs[0]
+
+    def add(self, a, b):
+        node = self.nodes.new("ShaderNodeAddShader")
+        self.link(a, node.inputs[0])
+        self.link(b, node.inputs[1])
+        return node.outputs[0]
+
+    def mix(self, part, a, b):
+        node = self.nodes.new("ShaderNodeMixShader")
+        for i, socket in enumerate((part, a, b)):
+            self.link(socket, node.inputs[i])
+        return node.outputs[0]
+
+
+    def math(self, operation, *operands):
+        node = self.nodes.new("ShaderNodeMath")
+        node.operation = operation
+        for i, operand in enumerate(operands):
+            if isinstance(operand, float):
+                node.inputs[i].default_value = operand
+            else:
+                self.link(operand, node.inputs[i])
+        return node.outputs[0]
+
+    def schlick(self, facing):
+        """Alike from both sides, which Blender's own node is not."""
+        geometry = self.nodes.new("ShaderNodeNewGeometry")
+        product = self.nodes.new("ShaderNodeVectorMath")
+        product.operation = "DOT_PRODUCT"
+        self.link(geometry.outputs["Normal"], product.inputs[0])
+        self.link(geometry.outputs["Incoming"], product.inputs[1])
+        edge = self.math("POWER", self.math("SUBTRACT", 1.0, self.math("ABSOLUTE", product.outputs["Value"])), 5.0)
+        return self.math("MULTIPLY_ADD", edge, 1.0 - facing, facing)
+
+
+def surface_of(shader, look):
+    """Metal is GGX by Schlick's law; a face of glass one interface, also by Schlick's, behind which light goes straight on."""
+    if look.is_metal:
+        metal = shader.bsdf("ShaderNodeBsdfPrincipled", look.base, Metallic=1.0, Roughness=look.roughness)
+        metal.node.distribution = "MULTI_GGX"
+        return metal
+    if look.is_glass:
+        passes = shader.bsdf("ShaderNodeBsdfTransparent", look.base)
+        return shader.mix(shader.schlick(0.04), passes, shader.bsdf("ShaderNodeBsdfGlossy", (1, 1, 1), Roughness=0.0))
+    surface = shader.bsdf("ShaderNodeBsdfDiffuse", look.reflectance, Roughness=0.0)
+    if look.transmittance.max() > 0:
+        surface = shader.add(surface, shader.bsdf("ShaderNodeBsdfTranslucent", look.transmittance))
+    return surface
+
+
+def make_material(name, look, image):
+    shader = Shader(name)
+    nodes, link = shader.nodes, shader.link
     output = nodes.new("ShaderNodeOutputMaterial")
-    front = nodes.new("ShaderNodeBsdfDiffuse")
-    front.inputs["Color"].default_value = (*reflectance, 1)
-    front.inputs["Roughness"].default_value = 0
-    surface = front.outputs[0]
-    if nits.max() > 0:
-        shine = nodes.new("ShaderNodeEmission")
-        shine.inputs["Color"].default_value = (*(nits / nits.max()), 1)
-        shine.inputs["Strength"].default_value = nits.max()
-        both = nodes.new("ShaderNodeAddShader")
-        link(surface, both.inputs[0])
-        link(shine.outputs[0], both.inputs[1])
-        surface = both.outputs[0]
-    if not double_sided:
-        back = nodes.new("ShaderNodeBsdfDiffuse")
-        back.inputs["Color"].default_value = (0, 0, 0, 1)
-        choose = nodes.new("ShaderNodeMixShader")
-        link(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], choose.inputs[0])
-        link(surface, choose.inputs[1])
-        link(back.outputs[0], choose.inputs[2])
-        surface = choose.outputs[0]
+    surface = surface_of(shader, look)
+    if look.nits.max() > 0:
+        shine = shader.bsdf("ShaderNodeEmission", look.nits / look.nits.max(), Strength=look.nits.max())
+        surface = shader.add(surface, shine)
+    if not look.double_sided:
+        back = shader.bsdf("ShaderNodeBsdfDiffuse", (0, 0, 0))
+        surface = shader.mix(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], surface, back)
     link(surface, output.inputs["Surface"])
     texture = nodes.new("ShaderNodeTexImage")
     texture.image = image
     nodes.active = texture  # where the bake goes
-    return material
+    return shader.material
 
 
 def make_mesh(corners, uvs, material_of):
@@ -193,10 +260,9 @@ def load(path, sizes):
     mesh = make_mesh(corners[real], uvs[real], slot_of[real])
     shines = False
     for material, page, colour in slots:
-        reflectance, nits, double_sided = light_and_reflectance(glb.gltf, None if material < 0 else material)
-        reflectance = np.minimum(reflectance * colour, 0.999)
-        shines = shines or nits.max() > 0
-        mesh.materials.append(make_material(f"{material}.{page}", reflectance, nits, double_sided, images[page] if page >= 0 else spare))
+        look = Material(glb.gltf, None if material < 0 else material, colour)
+        shines = shines or look.nits.max() > 0
+        mesh.materials.append(make_material(f"{material}.{page}", look, images[page] if page >= 0 else spare))
     if not shines:
         raise ValueError("no surface shines")
     return images
@@ -210,7 +276,9 @@ def set_up():
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
-    cycles.max_bounces = cycles.diffuse_bounces = 128
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 128
+    cycles.transparent_max_bounces = 128
+    cycles.blur_glossy = 0.0
     cycles.seed = 1
     scene.world = bpy.data.worlds.new("black")
     scene.world.color = (0, 0, 0)

@@ -189,6 +189,61 @@ TestScene mirrorRoom() {
   return scene;
 }
 
+/// The small room with tops of tables, and seats, of clear glass.
+TestScene glassRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_glass";
+  for (auto& material : scene.materials) {
+    if (material.name != "wood" && material.name != "red_seat") continue;
+    material.transmission = 1.0;
+    material.reflectance = glm::dvec3(0.98);
+    material.roughness = 0.0;
+  }
+  return scene;
+}
+
+/// The small room with walls of brushed metal.
+TestScene brushedRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_brushed";
+  for (auto& material : scene.materials) {
+    if (material.name != "red_wall" && material.name != "green_wall") continue;
+    material.metallic = 1.0;
+    material.roughness = 0.4;
+  }
+  return scene;
+}
+
+/// The small room, lit by a lamp in a shade of paper that stands on a table.
+TestScene shadeRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_shade";
+  for (auto& material : scene.materials) material.emission_nits = glm::dvec3(0.0);
+  Material paper{"paper", glm::dvec3(0.85), {}};
+  paper.diffuse_transmission = 0.5;
+  paper.double_sided = true;
+  const auto shade = scene.add(paper), bulb = scene.add({"bulb", glm::dvec3(0.5), {3000.0, 2800.0, 2400.0}});
+  constexpr double kTop = 0.74, kHalf = 0.15;  // of the table; of the shade
+  Object lamp{"table_lamp", {0.0, kTop, 0.0}, {}};
+  appendBox(lamp, {-0.04, kTop + 0.2, -0.04}, {0.04, kTop + 0.28, 0.04}, allFaces(bulb));
+  const glm::dvec3 low(-kHalf, kTop + 0.08, -kHalf), high(kHalf, kTop + 0.4, kHalf);
+  appendBox(lamp, low, high, allFaces(shade), kYMin | kYMax);
+  scene.objects.push_back(std::move(lamp));
+  return scene;
+}
+
+/// The small room without one of its walls, under an even sky.
+TestScene openRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_open";
+  for (auto& material : scene.materials) material.emission_nits = glm::dvec3(0.0);
+  auto& walls = scene.objects.front().polygons;
+  std::erase_if(walls, [&](const Polygon& wall) { return scene.materials[wall.material].name == "green_wall"; });
+  scene.sky_upper_nits = {900.0, 950.0, 1000.0};
+  scene.sky_lower_nits = glm::dvec3(300.0);
+  return scene;
+}
+
 TestScene doubleSidedTwin(TestScene scene) {
   scene.name += "_double";
   for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
@@ -209,6 +264,10 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
            }},
           {"room_small", smallRoom},
           {"room_small_mirror", mirrorRoom},
+          {"room_small_glass", glassRoom},
+          {"room_small_brushed", brushedRoom},
+          {"room_small_shade", shadeRoom},
+          {"room_small_open", openRoom},
           {"room_seminar", seminarRoom},
           {"room_lights", lightsRoom},
           {"room_area", areaRoom},

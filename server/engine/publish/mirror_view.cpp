@@ -1,6 +1,8 @@
 #include "server/engine/publish/mirror_view.h"
 
+#include <algorithm>
 #include <array>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <optional>
@@ -88,7 +90,28 @@ class MirrorView {
     const auto seen = rays_->see(at, reflection.direction, key, end);
     if (solver::LeafRays::isSky(seen)) return part * gpu::skyRadiance(scene_.sky, reflection.direction);
     if (seen == solver::LeafRays::kNothing) return glm::vec3(0.0F);
-    return part * radiosity_[seen] * static_cast<float>(std::numbers::inv_pi);
+    return part * radiosityAt(end, seen) * static_cast<float>(std::numbers::inv_pi);
+  }
+
+  /// As a lookup in the lightmap has it: between the middles of leaves.
+  [[nodiscard]] glm::vec3 radiosityAt(const solver::LeafRays::Place& place, std::uint32_t value) const {
+    if (place.value != value) return radiosity_[value];
+    const auto& side = rays_->sideOf(value);
+    const glm::dvec2 last(side.width - 1, side.height - 1);
+    const auto at = glm::clamp(rays_->texelOf(place) - 0.5, glm::dvec2(0.0), last);
+    const auto low = glm::floor(at), part = at - low;
+    glm::dvec3 sum(0.0);
+    double weights = 0.0;
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      const auto x = std::min(static_cast<std::uint32_t>(low.x) + k % 2, side.width - 1);
+      const auto y = std::min(static_cast<std::uint32_t>(low.y) + k / 2, side.height - 1);
+      const auto beside = side.first_value + y * side.width + x;
+      if (rays_->areaOf(beside) <= 0.0) continue;
+      const double weight = (k % 2 == 1 ? part.x : 1.0 - part.x) * (k / 2 == 1 ? part.y : 1.0 - part.y);
+      sum += weight * glm::dvec3(radiosity_[beside]);
+      weights += weight;
+    }
+    return weights > 0.0 ? glm::vec3(sum / weights) : radiosity_[value];
   }
 
   const MirrorScene& scene_;

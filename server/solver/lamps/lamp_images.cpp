@@ -131,7 +131,7 @@ LampImages::Unhidden LampImages::unhidden(std::uint32_t lamp, const LeafRays::Pl
     auto shaded = place;
     shaded.normal = shading;
     const auto look = lookAt(source, shaded, at);
-    if (glm::dot(place.normal, look.way) <= 0.0) return {look.way, look.brings, 0.0};
+    if (glm::dot(place.normal, look.way) <= 0.0) return {};  // the surface itself hides it
     return {look.way, look.brings, look.brings};
   }
   const auto& polygon = polygons_[lamp];

@@ -28,8 +28,7 @@ class LampImages {
   /// surfaces, unit box squared.
   [[nodiscard]] static float leastEmission(std::span<const LightPolygon> polygons, double area);
 
-  /// Dark lamps count as well. `polygons`: all there are of the scene. Null: there is no flat mirror, or no lamp, or
-  /// there are too many.
+  /// Images of these lamps, which may be dark. Null: there is no flat mirror, or no lamp, or there are too many.
   [[nodiscard]] static std::shared_ptr<const LampImages> find(const scene::PatchScene& patches,
                                                               const std::vector<Side>& sides,
                                                               std::shared_ptr<const LeafRays> rays,

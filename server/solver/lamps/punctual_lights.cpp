@@ -159,6 +159,8 @@ std::uint64_t PunctualLights::Source::shapeKey() const {
                             shape.half.x, shape.half.y}) {
     key = mixKeys(key, std::bit_cast<std::uint32_t>(value + 0.0F));  // -0 becomes 0
   }
+  for (const float value : {shape.cone_scale, shape.cone_offset - 1.0F, shape.range})  // which most have not
+    if (value != 0.0F) key = mixKeys(key, std::bit_cast<std::uint32_t>(value));
   return key;
 }
 

@@ -29,7 +29,8 @@ void LinkedSolver::assess() {
   if (isRepairing()) return;  // nothing is known before all links are true
   if (shown_) return;         // it says what it said
   if (from_links_ == FromLinks::kAfterEdit) {
-    if (gather_ && gather_->raysBehind() > kRaysAtOnce) return;  // nor is it now: steps trace rays in slices
+    const auto behind = gather_ ? gather_->raysBehind() + gather_->looksBehind(lamp_images_, source_images_) : 0;
+    if (behind > kRaysAtOnce) return;  // nor is it now: steps trace rays in slices
     // Somebody wants to know before the next step.
     tryNow([this] {
       do {
@@ -75,7 +76,7 @@ void LinkedSolver::assess() {
   error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
 }
 
-/// Light that lamps may send by way of mirrors, which rays alone bring.
+/// Light that lamps may send by way of mirrors, which comes with rays.
 double LinkedSolver::inMirrors() const {
   double power = 0.0;
   for (const auto& shooter : system_.shooters()) power += mirrors_ && shooter.isLight() ? shooter.power() : 0.0;

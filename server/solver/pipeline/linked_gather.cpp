@@ -151,7 +151,7 @@ void LinkedSolver::startRays() {
 /// Of lamps that shine, in flat mirrors. Those of a crowd are too many.
 void LinkedSolver::findImages() {
   lamp_images_ = source_images_ = {};
-  if (!gather_ || !mirrors_) return;
+  if (!gather_ || !mirrors_ || gather_->hasNoRoomForImages()) return;
   std::vector<LightPolygon> lamps;
   std::vector<PunctualLights::Source> sources;
   const auto& areas = system_.leafAreas();
@@ -267,7 +267,7 @@ LinkedSolver::Noise LinkedSolver::noise() const {
   const double norm = fieldNorm(), square = norm * norm, all = by_links_ * by_links_;
   if (!gather_ || square <= 0.0) return {0.0, all};
   const double rays = gather_->rayNoise() / square, smoothed = gather_->smoothedSquare() / square;
-  const double links = std::max(0.0, all - smoothed - rays);
+  const double links = std::max(0.0, all - smoothed - rays - gather_->imageNoise() / square);
   const double share = rays + links > 0.0 ? smoothed / (rays + links) : 0.0;
   return {rays * (1.0 + share), links * (1.0 + share)};
 }

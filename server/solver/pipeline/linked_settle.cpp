@@ -68,7 +68,13 @@ bool LinkedSolver::lightLeaves() {
     pass_ = Pass::kRays;
     if (gather_) gather_->begin(leftLight());
   }
-  if (gather_ && !gather_->advance(kSliceSeconds)) return false;
+  const bool is_done = !gather_ || gather_->advance(kSliceSeconds);
+  if (gather_ && gather_->hasNoRoomForImages() && (lamp_images_.images || source_images_.images)) {
+    findImages();  // there are none any more, and what they would have brought is spread
+    gather_->begin(leftLight());
+    return false;
+  }
+  if (!is_done) return false;
   half_ = std::move(over_links_);
   if (gather_) {
     inBothHalves([&](std::size_t half) {

@@ -13,16 +13,17 @@ namespace {
 
 /// Normals and places of one plane differ by no more, beside the rounding of corners: an image at the far end of the
 /// unit box is off by as much.
-constexpr double kSame = 1e-5;
+constexpr double kSame = 2e-6;
 
 bool isSharp(const SpecularLeaves& mirrors, std::uint32_t value) {
   return mirrors.has(value) && mirrors.roughness(value) <= static_cast<double>(FlatMirrors::kSharp);
 }
 
-bool hasSharp(const SpecularLeaves& mirrors, const Side& side) {
+/// The first leaf of a side that reflects sharply, or kNone.
+std::uint32_t firstSharp(const SpecularLeaves& mirrors, const Side& side) {
   for (auto value = side.first_value; value < side.first_value + side.leaf_count; ++value)
-    if (isSharp(mirrors, value)) return true;
-  return false;
+    if (isSharp(mirrors, value)) return value;
+  return scene::kNone;
 }
 
 /// Of a surface; area 0: it is not flat.
@@ -72,9 +73,12 @@ std::shared_ptr<const FlatMirrors> FlatMirrors::find(const scene::PatchScene& pa
   std::size_t leaves = 0;
   for (const auto& side : sides) {
     leaves += side.leaf_count;
-    if (!hasSharp(mirrors, side)) continue;
-    const auto plane = planeUnder(patches, patches.surfaces[side.surface]);
+    const auto sharp = firstSharp(mirrors, side);
+    if (sharp == scene::kNone) continue;
+    auto plane = planeUnder(patches, patches.surfaces[side.surface]);
     if (!(plane.area > 0.0)) continue;
+    const auto reflects = mirrors.meanReflectance(sharp);
+    plane.area *= static_cast<double>(std::max({reflects.x, reflects.y, reflects.z}));
     const auto known = std::ranges::find_if(planes, [&](const Plane& other) { return isSame(plane, other); });
     of_side[side.number] = static_cast<std::size_t>(known - planes.begin());
     if (known == planes.end()) {

@@ -22,14 +22,14 @@ class FlatMirrors {
     glm::dvec3 normal{0.0};          ///< unit
     double distance = 0.0;           ///< of its points along the normal, unit box
     glm::dvec3 low{0.0}, high{0.0};  ///< box around its mirrors
-    double area = 0.0;
+    double area = 0.0;               ///< of these, times what they reflect of light from all around
 
     [[nodiscard]] double heightOf(const glm::dvec3& point) const;
     [[nodiscard]] glm::dvec3 mirrored(const glm::dvec3& point) const;
     [[nodiscard]] glm::dvec3 mirroredWay(const glm::dvec3& way) const;
   };
 
-  /// The `most` planes with the largest mirrors. Null: there are none. O(leaves).
+  /// The `most` planes of whose mirrors most light may come. Null: there are none. O(leaves).
   [[nodiscard]] static std::shared_ptr<const FlatMirrors> find(const scene::PatchScene& patches,
                                                                const std::vector<Side>& sides,
                                                                const SpecularLeaves& mirrors, std::size_t most);

@@ -26,6 +26,8 @@ constexpr double kLeastSlope = 0.05;
 constexpr double kFar = 4.0;
 /// What a ray in single precision is sent to is known to so much (unit box).
 constexpr double kNearEnd = 1e-5;
+/// What lies in the plane of a point to so much is met so much before or behind it, at flat angles.
+constexpr double kNearPlane = 2e-4;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
 constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
 /// Sheets within this of the last may lie in the same place (geometry::RayScene).
@@ -304,33 +306,37 @@ LeafRays::Arrival LeafRays::arriveAt(const Place& from, const glm::dvec3& at) co
   const double length = glm::length(way);
   if (length <= kNearEnd) return {};
   const auto direction = way / length;
-  const geometry::Ray ray{glm::vec3(origin), glm::vec3(direction), static_cast<float>(length + kNearEnd),
+  const geometry::Ray ray{glm::vec3(origin), glm::vec3(direction), static_cast<float>(length + kNearPlane),
                           from.triangle};
   std::array<std::uint32_t, kMostSheets> passed;
   double part = 1.0;
+  Arrival beneath;
   for (std::size_t sheets = 0; sheets < kMostSheets; ++sheets) {
     const auto hit = rays_.nearest(ray, std::span(passed).first(sheets));
-    if (!hit.found()) return {};
+    const double before = length - static_cast<double>(hit.t);
+    if (!hit.found() || before < -kNearPlane) break;
     const auto there = origin + static_cast<double>(hit.t) * direction;
     const double stopped = stoppedPart(hit, there, direction);
     passed[sheets] = hit.triangle;
-    if (static_cast<double>(hit.t) < length - kNearEnd) {
+    const auto& frame = patches_.triangles[hit.triangle];
+    const bool is_in_plane = std::abs(glm::dot(glm::dvec3(frame.normal), there - at)) <= kNearEnd;
+    if (!is_in_plane || before > kNearPlane) {
+      if (before < kNearEnd) break;
       part *= 1.0 - stopped;
       if (part <= 0.0) return {};
       continue;
     }
-    const auto& frame = patches_.triangles[hit.triangle];
     const auto texel = texelAt(frame, there);
     const glm::dvec3 normal(hit.front ? frame.normal : -frame.normal);
     Arrival arrival{part * stopped, {positionAt(frame, texel), normal, kNothing, hit.triangle}};
     const auto s = litSideOf(hit);
     if (s == scene::kNone) return arrival;
     const auto value = leafAt(sides_[s], texel);
-    if (isBeneath(sides_[s], value)) continue;  // what covers it is met as well
     arrival.end.value = standInOf(value);
-    return arrival;
+    if (!isBeneath(sides_[s], value)) return arrival;
+    if (!(beneath.part > 0.0)) beneath = arrival;  // what covers it is met as well, if something does there
   }
-  return {};
+  return beneath;
 }
 
 glm::vec3 LeafRays::startOf(const Place& place) { return glm::vec3(lifted(place)); }

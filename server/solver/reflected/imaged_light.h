@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "server/solver/lamps/lamp_images.h"
@@ -18,7 +18,7 @@ namespace radiosity::solver {
 
 class ImagedLight {
  public:
-  /// `sides` are to outlive it. `most_bytes`: for all that it keeps; images that need more are given up (images()).
+  /// `sides` are to outlive it. `most_bytes`: for all that it keeps; images that need more are given up.
   ImagedLight(const std::vector<Side>& sides, std::shared_ptr<const LeafRays> rays, std::uint64_t seed,
               std::size_t most_bytes)
       : sides_(sides), rays_(std::move(rays)), seed_(seed), most_bytes_(most_bytes) {}
@@ -39,6 +39,10 @@ class ImagedLight {
   /// Goes on for about `seconds`, on all cores: until it is true. Where the cuts lie changes nothing. Throws
   /// std::bad_alloc.
   bool advance(double seconds);
+  /// Rays that the first looks at images take that begin() would find nothing known of.
+  [[nodiscard]] std::uint64_t looksFor(const Lamps& lamps) const;
+  /// They took too much memory: from then on nothing is looked at.
+  [[nodiscard]] bool isGivenUp() const { return is_given_up_; }
   /// More looks are asked for than were made.
   [[nodiscard]] bool isBehind() const;
   /// After that; null: there are none.
@@ -59,13 +63,20 @@ class ImagedLight {
   struct OfImage {
     std::uint64_t key = 0;
     std::uint32_t times = 0;
-    bool is_whole = false;                   ///< all sides were looked at
-    std::vector<std::vector<Leaf>> of_side;  ///< those that get some
+    bool is_whole = false;                 ///< all sides were looked at
+    std::vector<std::vector<Leaf>> parts;  ///< those that get some, by the rows that were looked from together
   };
+  /// Rows of a side, first to end - 1.
   struct Look {
-    std::uint32_t image, side;
+    std::uint32_t image, side, first, end;
   };
-  [[nodiscard]] std::vector<Leaf> look(const LampImages::Image& image, const Side& side) const;
+  [[nodiscard]] bool isKnown(const OfImage& image, std::uint64_t key) const;
+  [[nodiscard]] bool isKnown(std::uint64_t key) const;
+  [[nodiscard]] std::optional<OfImage> take(std::uint64_t key);
+  void plan(std::uint32_t image);
+  [[nodiscard]] std::vector<Leaf> look(const Look& look) const;
+  void askAgain(const LampImages::Image& image, Leaf& leaf) const;
+  void keepSpare();
   /// Returns at how many of its places a leaf sees something of the image, of 2 `looks`.
   std::uint32_t lookFrom(const LampImages::Image& image, std::uint32_t looks, Leaf& leaf) const;
   template <typename Visit>
@@ -78,8 +89,10 @@ class ImagedLight {
   std::size_t most_bytes_;
   Lamps lamps_;
   const LeafShading* shading_ = nullptr;
-  std::uint32_t times_ = 1;     ///< as many looks as at first
+  std::uint32_t times_ = 1;  ///< as many looks as at first
+  bool is_given_up_ = false;
   std::vector<OfImage> known_;  ///< as the images are
+  std::vector<OfImage> spare_;  ///< of others, which may come back
   std::vector<Look> pending_;
   std::size_t next_ = 0;  ///< of these
 };

@@ -102,6 +102,12 @@ class LeafGather {
     return !sights_.isTraced() || imaged_lamps_.isBehind() || imaged_sources_.isBehind();
   }
   [[nodiscard]] std::uint64_t raysBehind() const { return sights_.untraced(); }
+  /// Rays that the first looks at those images take that are not known.
+  [[nodiscard]] std::uint64_t looksBehind(const ImagedLight::Lamps& lamps, const ImagedLight::Lamps& sources) const {
+    return imaged_lamps_.looksFor(lamps) + imaged_sources_.looksFor(sources);
+  }
+  /// There was no room for what images bring: they are to be left out.
+  [[nodiscard]] bool hasNoRoomForImages() const { return imaged_lamps_.isGivenUp() || imaged_sources_.isGivenUp(); }
   /// Those are given up, where there are others.
   void giveUp() { sights_.giveUp(); }
 
@@ -140,7 +146,7 @@ class LeafGather {
   [[nodiscard]] double imageNoise() const { return image_noise_; }
   /// Looks about so many times as often at each. False: there can be no more.
   bool refineImages(double times);
-  /// Flux that leaves get of such images.
+  /// Flux that leaves get of images of lights that are no surfaces.
   [[nodiscard]] const std::array<double, 3>& imagedFlux() const { return imaged_flux_; }
   /// Flux that comes straight from the sky, or by way of mirrors.
   [[nodiscard]] const std::array<double, 3>& skyFlux() const { return from_sky_; }
@@ -230,7 +236,7 @@ class LeafGather {
   void takeMirrors(std::size_t half);
   [[nodiscard]] bool takesLight(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] bool isImaged(const LeafSights::Step& step) const;
-  [[nodiscard]] Light32 imagedIn(const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 imagedIn(std::size_t half, const LeafSights::Step& step) const;
   [[nodiscard]] Light32 arrivesAsImage(std::size_t half, std::uint32_t lamp, const LeafSights::Step& step) const;
   [[nodiscard]] Light32 imagedAt(std::size_t half, std::uint32_t end) const;
   void takeImages();

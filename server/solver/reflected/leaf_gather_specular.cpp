@@ -84,7 +84,7 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
     if (source != nullptr) {
       add(met, shotAt(half, step.next));
       add(met, imagedAt(half, step.next));
-      not_here = imagedIn(step);
+      not_here = imagedIn(half, step);
     }
     for (std::size_t c = 0; c < 3; ++c) light[c] += tint[c] * met[c] - not_here[c];
   }
@@ -99,10 +99,17 @@ bool LeafGather::isImaged(const LeafSights::Step& step) const {
 }
 
 /// Of a step: light of a lamp that the ray found in a mirror and that leaves get as an image, without the ray.
-LeafGather::Light32 LeafGather::imagedIn(const LeafSights::Step& step) const {
-  if (step.next >= sights_.leafCount() || !isImaged(step)) return {};
+LeafGather::Light32 LeafGather::imagedIn(std::size_t half, const LeafSights::Step& step) const {
+  if (!isImaged(step)) return {};
+  auto end = step.next;
+  if (end >= sights_.endCount()) {  // rays go on from lamps of metal, too
+    const auto& next = sights_.steps(half)[end - sights_.endCount()];
+    if (SpecularStep::is(next.by) && SpecularStep::of(next.by).is_again) return {};
+    end = LeafSights::leafOf(next);
+  }
+  if (end >= sights_.leafCount()) return {};
   const auto tint = tintOf(step);
-  const auto& lamp = light_.imaged_lamps[step.next];
+  const auto& lamp = light_.imaged_lamps[end];
   return {tint[0] * lamp.x, tint[1] * lamp.y, tint[2] * lamp.z, 0.0F};
 }
 
@@ -115,9 +122,9 @@ LeafGather::Light32 LeafGather::arrivesAsImage(std::size_t half, std::uint32_t l
   return {tint[0] * light.x, tint[1] * light.y, tint[2] * light.z, 0.0F};
 }
 
-/// The same of where a ray ends, or goes on: who sees that in another mirror gets no image of it.
+/// What imagedIn() tells of where a ray ends, or goes on: who sees that in another mirror gets no image of it.
 LeafGather::Light32 LeafGather::imagedAt(std::size_t half, std::uint32_t end) const {
-  return end >= sights_.endCount() ? imagedIn(sights_.steps(half)[end - sights_.endCount()]) : Light32{};
+  return end >= sights_.endCount() ? imagedIn(half, sights_.steps(half)[end - sights_.endCount()]) : Light32{};
 }
 
 /// What arrives of images, which is like light over links from then on.

@@ -28,6 +28,8 @@ static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPac
 constexpr double kAskAgain = 0.25;
 /// Points of a lamp that is no surface.
 constexpr std::uint32_t kLampLooks = 32;
+/// Rays of a look at an image: to the mirror, and from there to the lamp.
+constexpr std::uint32_t kRaysOfLook = 2;
 /// Ways to a lamp end so far before it (unit box), well above the rounding of positions.
 constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
@@ -167,6 +169,8 @@ PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, s
 std::uint64_t PlaceLight::looksAPoint() const {
   std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0);
   for (const auto& source : sources_) looks += source.kind == PunctualLights::Source::Kind::kLamp ? kLampLooks : 1;
+  for (const auto* images : {lamp_images_.images.get(), source_images_.images.get()})
+    if (images != nullptr) looks += std::uint64_t{kRaysOfLook} * kAllLooks * images->images().size();
   return looks;
 }
 

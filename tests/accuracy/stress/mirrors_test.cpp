@@ -132,7 +132,8 @@ TEST_P(MirrorFurnace, KeepsItsLightAroundAWhiteMirror) {
 INSTANTIATE_TEST_SUITE_P(Roughness, MirrorFurnace, testing::Values(0.0, 0.3, 0.7, 1.0),
                          [](const auto& info) { return std::to_string(std::lround(info.param * 10.0)); });
 
-enum class LampKind { kSurface, kPoint, kSpot, kBall, kRectangle };
+/// A lamp that is metal, as those are of which a file tells nothing but light; one behind bars that cut its leaves.
+enum class LampKind { kSurface, kMetal, kBarred, kPoint, kSpot, kBall, kRectangle };
 
 /// Hangs in one half of the box; `side`: 1, or -1 in the mirror image of that.
 test_scenes::Light lightOf(LampKind kind, double side) {
@@ -150,14 +151,25 @@ test_scenes::Light lightOf(LampKind kind, double side) {
   return light;
 }
 
+/// Right below a lamp of that half.
+Object barsBelow(double side, std::uint32_t material) {
+  Object bars{side > 0.0 ? "bars" : "other_bars", {}, {}};
+  for (const double x : {0.8, 1.0, 1.2}) {
+    const double low = side * x - 0.02, high = side * x + 0.02;
+    appendBox(bars, {low, 1.78, 0.7}, {high, 1.795, 1.3}, test_scenes::allFaces(material));
+  }
+  return bars;
+}
+
 /// The half of a room that lies before a mirror, or all of it. A lamp hangs in each half.
 TestScene box(bool is_doubled, LampKind kind) {
   TestScene scene;
   scene.name = is_doubled ? "doubled_box" : "mirrored_box";
   const auto white = scene.add({"white", glm::dvec3(0.7, 0.6, 0.5), {}});
   const auto red = scene.add({"red", glm::dvec3(0.7, 0.2, 0.2), {}});
-  const auto light = scene.add({"light", glm::dvec3(0.5), glm::dvec3(10.0)});
-  const auto glass = scene.add(mirror());
+  Material shining{"light", glm::dvec3(0.5), glm::dvec3(10.0)};
+  if (kind == LampKind::kMetal) shining.metallic = 1.0;
+  const auto light = scene.add(shining), glass = scene.add(mirror());
   Object room{"room", {}, {}};
   appendBox(room, {is_doubled ? -2.0 : 0.0, 0, 0}, {2, 2, 2},
             {is_doubled ? red : glass, red, white, white, white, white}, test_scenes::kNoFace, true);
@@ -165,8 +177,9 @@ TestScene box(bool is_doubled, LampKind kind) {
   for (const double side : {1.0, -1.0}) {
     if (side < 0.0 && !is_doubled) break;
     const auto name = side > 0.0 ? "lamp" : "other";
-    if (kind == LampKind::kSurface) {
+    if (kind == LampKind::kSurface || kind == LampKind::kMetal || kind == LampKind::kBarred) {
       scene.objects.push_back(test_scenes::makeCeilingLamp(name, {side, 1.8, 1.0}, 0.6, 0.6, white, light));
+      if (kind == LampKind::kBarred) scene.objects.push_back(barsBelow(side, white));
     } else {
       scene.lights.push_back(lightOf(kind, side));
     }
@@ -213,7 +226,8 @@ TEST_P(MirroredBox, IsLitAsTheDoubledBox) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lamp, MirroredBox,
-                         testing::Values(std::pair("surface", LampKind::kSurface), std::pair("point", LampKind::kPoint),
+                         testing::Values(std::pair("surface", LampKind::kSurface), std::pair("metal", LampKind::kMetal),
+                                         std::pair("barred", LampKind::kBarred), std::pair("point", LampKind::kPoint),
                                          std::pair("spot", LampKind::kSpot), std::pair("ball", LampKind::kBall),
                                          std::pair("rectangle", LampKind::kRectangle)),
                          [](const auto& info) { return info.param.first; });

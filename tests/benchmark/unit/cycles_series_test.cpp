@@ -1,8 +1,10 @@
 // The bake script against the path tracer: units, orientation of the pages, and physics agree. Needs Blender.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <string>
 
 #include "tests/accuracy/solve_run.h"
 #include "tests/benchmark/error_series.h"
@@ -12,16 +14,23 @@
 namespace radiosity::benchmark {
 namespace {
 
-TEST(CyclesSeries, BakesOfTheCornellBoxConvergeToThePathTracer) {
+/// Mirrors, brushed metal, glass and paper are in these rooms, beside the Cornell box.
+class CyclesBakes : public testing::TestWithParam<const char*> {};
+
+TEST_P(CyclesBakes, ConvergeToThePathTracer) {
   if (std::system("blender --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "Blender is not installed";
   SeriesOptions options;
   options.bake_script = std::filesystem::path(RADIOSITY_SOURCE_DIR) / "tests/benchmark/cycles_bake.py";
   options.cycles_seconds = 3.0;
   const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "cycles_test";
   std::filesystem::create_directories(folder);
-  test_scenes::writeGlb(test_scenes::cornell(), folder / "cornell.glb");
+  const std::string name = GetParam();
+  const auto scenes = test_scenes::allScenes();
+  const auto scene = std::ranges::find(scenes, name, [](const auto& known) { return known.first; });
+  ASSERT_NE(scene, scenes.end());
+  test_scenes::writeGlb(scene->second(), folder / (name + ".glb"));
   const auto run =
-      accuracy::runSolve(RADIOSITY_CLIENT, folder / "cornell.glb", folder, {"--error", "0.5", "--texels", "2000"});
+      accuracy::runSolve(RADIOSITY_CLIENT, folder / (name + ".glb"), folder, {"--error", "0.5", "--texels", "2000"});
   ASSERT_EQ(run.exit_code, 0) << run.last_line;  // only its charts are wanted
   const auto lit = accuracy::readLitScene(run.output);
   const auto reference =
@@ -36,6 +45,11 @@ TEST(CyclesSeries, BakesOfTheCornellBoxConvergeToThePathTracer) {
   // Mean of 800 texels: the standard error of the bias is the texels' RMS error over the root of 800; 4 of them.
   EXPECT_LT(std::abs(last.bias), 4.0 * last.solverRms() / std::sqrt(800.0) + 0.002);
 }
+
+INSTANTIATE_TEST_SUITE_P(Scene, CyclesBakes,
+                         testing::Values("cornell", "room_small_mirror", "room_small_brushed", "room_small_glass",
+                                         "room_small_shade"),
+                         [](const auto& info) { return std::string(info.param); });
 
 TEST(CyclesSeries, WithoutTexelsThatABakeCanBeJudgedOnNothingIsBaked) {
   accuracy::Reference reference;
