@@ -132,17 +132,20 @@ LampImages::Unhidden LampImages::unhidden(std::uint32_t lamp, const LeafRays::Pl
     shaded.normal = shading;
     const auto look = lookAt(source, shaded, at);
     if (glm::dot(place.normal, look.way) <= 0.0) return {};  // the surface itself hides it
-    return {look.way, look.brings, look.brings};
+    return {look.way, look.brings};
   }
   const auto& polygon = polygons_[lamp];
   const glm::dvec3 normal(polygon.normal), way = glm::dvec3(polygon.point(at.x, at.y)) - place.position;
-  if (glm::dot(place.position - glm::dvec3(polygon.corners[0]), normal) <= kInPlane) return {};
-  const std::span corners(polygon.corners.data(), polygon.corner_count);
-  Unhidden unhidden{way, formFactorsAboveBoth(place.position, place.normal, shading, corners).shading, 0.0};
-  const double square = glm::dot(way, way);
-  if (glm::dot(place.normal, way) > 0.0)
-    unhidden.weight = std::max(0.0, glm::dot(shading, way)) * std::max(0.0, -glm::dot(normal, way)) / (square * square);
-  return unhidden;
+  const double leaves = -glm::dot(normal, way), square = glm::dot(way, way);
+  if (leaves <= kInPlane || glm::dot(place.normal, way) <= 0.0) return {};
+  return {way, std::max(0.0, glm::dot(shading, way)) * leaves / (square * square)};
+}
+
+LeafRays::Place LampImages::behind(const FlatMirrors::Plane& plane, const LeafRays::Place& place) {
+  auto mirrored = place;
+  mirrored.position = plane.mirrored(place.position);
+  mirrored.normal = plane.mirroredWay(place.normal);
+  return mirrored;
 }
 
 LampImages::Look LampImages::look(const Image& image, const LeafRays::Place& place, const glm::dvec3& shading,
@@ -150,11 +153,9 @@ LampImages::Look LampImages::look(const Image& image, const LeafRays::Place& pla
   const auto& plane = flat_->planes()[image.plane];
   const double height = plane.heightOf(place.position);
   if (std::abs(height) <= kInPlane) return {};
-  auto behind = place;
-  behind.position = plane.mirrored(place.position);
-  behind.normal = plane.mirroredWay(place.normal);
+  const auto behind = LampImages::behind(plane, place);
   const auto unhidden = this->unhidden(image.lamp, behind, plane.mirroredWay(shading), at);
-  Look look{unhidden.whole, unhidden.weight, glm::dvec3(0.0)};
+  Look look{unhidden.weight, glm::dvec3(0.0)};
   if (!(look.weight > 0.0)) return look;
   const double rise = (height < 0.0 ? -1.0 : 1.0) * glm::dot(plane.normal, unhidden.way);
   if (rise <= std::abs(height) + kInPlane) return look;  // the lamp is on the other side
@@ -171,6 +172,23 @@ LampImages::Look LampImages::look(const Image& image, const LeafRays::Place& pla
   const auto edge = scene::GlassFace::edgeOf(static_cast<float>(cosine));
   look.seen = look.weight * arrival.part * open * glm::dvec3(mirrors_->reflectance(arrival.end.value, edge));
   return look;
+}
+
+glm::dvec3 LampImages::irradiance(const Image& image, const Looks& looks, std::span<const LeafRays::Place> places,
+                                  const glm::dvec3* shading) const {
+  if (looks.seen_count == 0) return glm::dvec3(0.0);
+  if (image.lamp >= polygons_.size()) return looks.seen / static_cast<double>(looks.count);
+  const auto& plane = flat_->planes()[image.plane];
+  const auto& polygon = polygons_[image.lamp];
+  const std::span corners(polygon.corners.data(), polygon.corner_count);
+  double sum = 0.0;
+  for (const auto& place : places) {
+    const auto [position, normal, value, triangle] = behind(plane, place);
+    if (glm::dot(position - glm::dvec3(corners[0]), glm::dvec3(polygon.normal)) <= kInPlane) continue;
+    sum += shading == nullptr ? polygonFormFactor(position, normal, corners)
+                              : formFactorsAboveBoth(position, normal, plane.mirroredWay(*shading), corners).shading;
+  }
+  return sum / static_cast<double>(places.size()) * (looks.seen / looks.weight);
 }
 
 }  // namespace radiosity::solver

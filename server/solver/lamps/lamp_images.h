@@ -55,47 +55,41 @@ class LampImages {
 
   /// One point of the lamp, seen from a place by way of the mirror, for an emission or intensity of one.
   struct Look {
-    double whole = 0.0;    ///< what all of the lamp would bring without mirror and obstacles, if that is known, or
-                           ///< what it would if it were as bright all over as at the point
-    double weight = 0.0;   ///< of the point among those of the lamp
-    glm::dvec3 seen{0.0};  ///< of the weight, what the mirror reflects and nothing hides
+    double weight = 0.0;   ///< what it brings to the place without mirror and obstacles, of a polygon but for a factor
+    glm::dvec3 seen{0.0};  ///< of that, what the mirror reflects and nothing hides
   };
   /// `shading`: normal that light counts for, unit length. `at`: uniform in [0, 1)^2.
   [[nodiscard]] Look look(const Image& image, const LeafRays::Place& place, const glm::dvec3& shading,
                           const glm::dvec2& at) const;
 
   /// What looks tell together.
-  class Looks {
-   public:
-    void add(const Look& look) {
-      ++count_;
-      seen_count_ += look.seen != glm::dvec3(0.0) ? 1 : 0;
-      whole_ += look.whole;
-      weight_ += look.weight;
-      seen_ += look.seen;
-    }
-    [[nodiscard]] glm::dvec3 irradiance() const {
-      return weight_ > 0.0 ? whole_ / static_cast<double>(count_) * (seen_ / weight_) : glm::dvec3(0.0);
-    }
-    [[nodiscard]] bool seesNothing() const { return seen_count_ == 0; }
-    [[nodiscard]] bool seesAll() const { return seen_count_ == count_; }
-    [[nodiscard]] std::uint32_t seenCount() const { return seen_count_; }
+  struct Looks {
+    std::uint32_t count = 0, seen_count = 0;
+    double weight = 0.0;
+    glm::dvec3 seen{0.0};
 
-   private:
-    std::uint32_t count_ = 0, seen_count_ = 0;
-    double whole_ = 0.0, weight_ = 0.0;
-    glm::dvec3 seen_{0.0};
+    void add(const Look& look) {
+      ++count;
+      seen_count += look.seen != glm::dvec3(0.0) ? 1 : 0;
+      weight += look.weight;
+      seen += look.seen;
+    }
   };
+  /// By looks from these places: of a polygon its form factor, which is exact, times the part that is seen. `shading`:
+  /// null for the normals of the places.
+  [[nodiscard]] glm::dvec3 irradiance(const Image& image, const Looks& looks, std::span<const LeafRays::Place> places,
+                                      const glm::dvec3* shading = nullptr) const;
 
  private:
   LampImages() = default;
-  /// What a lamp brings to a place that no mirror is between, by one of its points.
+  /// The way from a place to a point of a lamp that no mirror is between, and what it brings.
   struct Unhidden {
-    glm::dvec3 way{0.0};  ///< to the point
-    double whole = 0.0, weight = 0.0;
+    glm::dvec3 way{0.0};
+    double weight = 0.0;
   };
   [[nodiscard]] Unhidden unhidden(std::uint32_t lamp, const LeafRays::Place& place, const glm::dvec3& shading,
                                   const glm::dvec2& at) const;
+  [[nodiscard]] static LeafRays::Place behind(const FlatMirrors::Plane& plane, const LeafRays::Place& place);
   /// Around a lamp; of one that is far, a way towards it.
   struct Ball {
     glm::dvec3 centre{0.0};

@@ -5,7 +5,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
 #include <span>
 
 namespace radiosity::solver {
@@ -14,6 +13,10 @@ namespace {
 /// Normals and places of one plane differ by no more, beside the rounding of corners: an image at the far end of the
 /// unit box is off by as much.
 constexpr double kSame = 2e-6;
+
+/// Of the area of all surfaces, mirrors in one plane reflect as much as this at least: what comes from less is not
+/// worth looking for from everywhere. A table of glass is three times that, its edges a tenth.
+constexpr double kLeastPart = 1e-3;
 
 bool isSharp(const SpecularLeaves& mirrors, std::uint32_t value) {
   return mirrors.has(value) && mirrors.roughness(value) <= static_cast<double>(FlatMirrors::kSharp);
@@ -71,8 +74,10 @@ std::shared_ptr<const FlatMirrors> FlatMirrors::find(const scene::PatchScene& pa
   std::vector<Plane> planes;
   std::vector<std::size_t> of_side(sides.size(), std::numeric_limits<std::size_t>::max());
   std::size_t leaves = 0;
+  double area = 0.0;
   for (const auto& side : sides) {
     leaves += side.leaf_count;
+    area += static_cast<double>(patches.node_area[side.first_node + side.node_count - 1]);
     const auto sharp = firstSharp(mirrors, side);
     if (sharp == scene::kNone) continue;
     auto plane = planeUnder(patches, patches.surfaces[side.surface]);
@@ -89,9 +94,10 @@ std::shared_ptr<const FlatMirrors> FlatMirrors::find(const scene::PatchScene& pa
     known->high = glm::max(known->high, plane.high);
     known->area += plane.area;
   }
-  if (planes.empty() || most == 0) return nullptr;
-  std::vector<std::size_t> order(planes.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    if (planes[i].area >= kLeastPart * area) order.push_back(i);
+  if (order.empty() || most == 0) return nullptr;
   std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t i) { return planes[i].area; });
   order.resize(std::min({order.size(), most, std::size_t{kNoPlane}}));
   const std::shared_ptr<FlatMirrors> found(new FlatMirrors());

@@ -1,6 +1,7 @@
 #include "server/solver/reflected/imaged_light.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -205,20 +206,26 @@ void ImagedLight::askAgain(const LampImages::Image& image, Leaf& leaf) const {
 std::uint32_t ImagedLight::lookFrom(const LampImages::Image& image, std::uint32_t looks, Leaf& leaf) const {
   const auto& side = rays_->sideOf(leaf.value);
   const auto of_leaf = mixKeys(mixKeys(seed_ ^ kSeed, side.key), leaf.value - side.first_value);
+  const auto& images = *lamps_.images;
   std::uint32_t seen = 0;
   for (std::size_t half = 0; half < 2; ++half) {
     const Sobol4 draws(mixKeys(mixKeys(of_leaf, image.key), half));
-    LampImages::Looks geometric, shading;
+    std::array<LeafRays::Place, kAllLooks> places;
+    LampImages::Looks geometric, shaded;
     for (std::uint32_t i = 0; i < looks; ++i) {
       const auto draw = draws(i);
-      const auto place = rays_->placeOn(leaf.value, {draw.x, draw.y});
-      geometric.add(lamps_.images->look(image, place, place.normal, {draw.z, draw.w}));
+      auto& place = places[i % kAllLooks];
+      place = rays_->placeOn(leaf.value, {draw.x, draw.y});
+      geometric.add(images.look(image, place, place.normal, {draw.z, draw.w}));
       if (leaf.number != scene::kNone)
-        shading.add(lamps_.images->look(image, place, glm::dvec3(shading_->normal(leaf.number)), {draw.z, draw.w}));
+        shaded.add(images.look(image, place, glm::dvec3(shading_->normal(leaf.number)), {draw.z, draw.w}));
     }
-    seen += geometric.seenCount();
-    leaf.light[half] = glm::vec3(geometric.irradiance());
-    leaf.shaded[half] = glm::vec3(shading.irradiance());
+    const auto some = std::span(places).first(std::min(looks, kAllLooks));
+    seen += geometric.seen_count;
+    leaf.light[half] = glm::vec3(images.irradiance(image, geometric, some));
+    if (leaf.number == scene::kNone) continue;
+    const glm::dvec3 normal(shading_->normal(leaf.number));
+    leaf.shaded[half] = glm::vec3(images.irradiance(image, shaded, some, &normal));
   }
   return seen;
 }

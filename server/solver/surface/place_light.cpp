@@ -277,11 +277,11 @@ glm::dvec3 PlaceLight::fromImages(const Images& images, const Spot& spot, std::u
         const auto at = draws(k);
         some.add(images.images->look(image, spot.place, spot.shading, {at.x, at.y}));
       }
-      return some.irradiance();
+      return images.images->irradiance(image, some, std::span(&spot.place, 1), &spot.shading);
     };
     const auto light = glm::dvec3(images.light[image.lamp]);
     const auto first = look(0, kFirstLooks);
-    const bool agree = some.seesAll() || some.seesNothing();
+    const bool agree = some.seen_count == 0 || some.seen_count == some.count;
     if (looks == Looks::kFewer && agree && uniformFromKey(of_image) >= kAskAgain) {
       sum += light * first;
       continue;
