@@ -193,7 +193,8 @@ std::vector<ImagedLight::Leaf> ImagedLight::look(const Look& look) const {
 void ImagedLight::askAgain(const LampImages::Image& image, Leaf& leaf) const {
   if (uniformFromKey(mixKeys(mixKeys(seed_, image.key), leaf.value)) >= kAskAgain) return;
   auto all = leaf;
-  (void)lookFrom(image, times_ * kAllLooks, all);
+  const auto looks = times_ * kAllLooks, seen = lookFrom(image, looks, all);
+  if (seen == 0 || seen == 2 * looks) return;  // what they differ by is the noise of the first
   const auto stand = [](glm::vec3& first, const glm::vec3& of_all) {
     first = glm::max(glm::vec3(0.0F), first + (of_all - first) / static_cast<float>(kAskAgain));
   };
