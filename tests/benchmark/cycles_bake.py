@@ -116,6 +116,8 @@ class Material:
         self.is_glass = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0
         if self.is_glass and (extensions["KHR_materials_transmission"]["transmissionFactor"] < 1 or max(base) - min(base) > 1e-3):
             raise ValueError("only glass without colour is baked that passes all that it does not reflect")
+        if self.is_glass and ("KHR_materials_volume" in extensions or extensions.get("KHR_materials_ior", {}).get("ior", 1.5) != 1.5):
+            raise ValueError("only thin glass with an index of 1.5 is baked")
         self.base, self.roughness = base, pbr.get("roughnessFactor", 1.0)
         paper = extensions.get("KHR_materials_diffuse_transmission", {})
         passing = paper.get("diffuseTransmissionFactor", 0.0)
@@ -185,7 +187,7 @@ def surface_of(shader, look):
         return metal
     if look.is_glass:
         passes = shader.bsdf("ShaderNodeBsdfTransparent", look.base)
-        return shader.mix(shader.schlick(0.04), passes, shader.bsdf("ShaderNodeBsdfGlossy", (1, 1, 1), Roughness=0.0))
+        return shader.mix(shader.schlick(0.04), passes, shader.bsdf("ShaderNodeBsdfGlossy", (1, 1, 1), Roughness=look.roughness))
     surface = shader.bsdf("ShaderNodeBsdfDiffuse", look.reflectance, Roughness=0.0)
     if look.transmittance.max() > 0:
         surface = shader.add(surface, shader.bsdf("ShaderNodeBsdfTranslucent", look.transmittance))

@@ -99,7 +99,7 @@ def measure(name, build, options, folder):
     return {"name": name, "scene": scene, "seconds": seconds,
             "ofTwin": seconds / statistics.median(times_of_twin) if twin else None,
             "texels": report["patches"],
-            "stated": report["error"]["total"], "true": found["total"]["relative_rms"], "p95": report["error"]["p95"],
+            "stated": report["error"]["total"], "true": found["total"]["relative_rms"], "p95": report["error"]["p95"] or 0.0,
             "trueP95": found["surface"]["p95"], "meanRatio": found["surface"]["mean_ratio"]}
 
 
@@ -126,11 +126,14 @@ def main():
     if unknown:
         parser.error(f"no case {', '.join(unknown)}; there are: {', '.join(CASES)}")
     build = pathlib.Path(os.environ["RADIOSITY_BUILD"])
+    options.output.mkdir(parents=True, exist_ok=True)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        write_sky(folder / "sky.hdr")
-        for name in options.NAME or CASES:
+        names = options.NAME or list(CASES)
+        if any("SKY4K" in CASES[name][1] for name in names):
+            write_sky(folder / "sky.hdr")
+        for name in names:
             rows.append(measure(name, build, options, folder))
             (options.output / "features.json").write_text(json.dumps(rows, indent=2) + "\n")
             (options.output / "features.md").write_text(table(rows, options))

@@ -240,9 +240,10 @@ void tellMirrors(const LitParts& parts, const solver::Solver& solver, double emi
   const double spread = solver.spreadByMirrors();
   if (!(spread > kMuchInMirrors * emitted)) return;
   warnings.push_back(fmt::format(
-      "{:.1f} % of all light is what round or rough mirrors, or two mirrors in a row, reflect of point, spot, area and "
-      "directional lights, suns and bright skies: it is spread as by a rough surface, since these are found in flat "
-      "smooth mirrors only; emissive surfaces instead of lights are reflected as they are",
+      "{:.1f} % of all light is what round, rough or small mirrors, or two mirrors in a row, reflect of point, spot, "
+      "area and directional lights, suns and bright skies: it is spread as by a rough surface, since these are found "
+      "in flat, "
+      "smooth and large mirrors only; emissive surfaces instead of lights are reflected as they are",
       100.0 * spread / emitted));
 }
 

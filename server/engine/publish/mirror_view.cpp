@@ -40,8 +40,11 @@ class MirrorView {
     for (const auto& side : sides_) {
       const auto emission = scene.materials.emission.side(side.number);
       const auto reflectance = scene.materials.reflectance.side(side.number);
-      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-        radiosity_.push_back(emission[leaf] + reflectance[leaf] * scene.irradiance[side.first_node + leaf]);
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+        own_.push_back(emission[leaf]);
+        reflectance_.push_back(reflectance[leaf]);
+        irradiance_.push_back(scene.irradiance[side.first_node + leaf]);
+      }
     }
     addPassed(scene);
   }
@@ -59,7 +62,7 @@ class MirrorView {
       from.triangle = end.triangle;
       value = rays_->see(from, direction, key, end);
     }
-    if (value >= radiosity_.size() || !mirrors_->has(value)) return glm::vec3(0.0F);
+    if (value >= own_.size() || !mirrors_->has(value)) return glm::vec3(0.0F);
     const double roughness = mirrors_->roughness(value);
     const std::uint32_t count = roughness > 0.0 ? kDirections : 1;
     glm::vec3 sum(0.0F);
@@ -70,14 +73,9 @@ class MirrorView {
  private:
   /// What translucent surfaces let through.
   void addPassed(const MirrorScene& scene) {
-    std::vector<glm::vec3> irradiance;  // by leaf value
-    for (const auto& side : sides_) {
-      const auto* first = &scene.irradiance[side.first_node];
-      irradiance.insert(irradiance.end(), first, first + side.leaf_count);
-    }
     const auto areas = solver::leafAreas(*scene.patches, sides_);
     for (const auto& leaf : solver::passingLeaves(scene.materials.transmittance, sides_, areas))
-      radiosity_[leaf.to] += leaf.of(irradiance);
+      own_[leaf.to] += leaf.of(irradiance_);
   }
 
   [[nodiscard]] glm::vec3 reflected(const solver::LeafRays::Place& at, std::uint32_t value, const glm::dvec3& direction,
@@ -93,9 +91,14 @@ class MirrorView {
     return part * radiosityAt(end, seen) * static_cast<float>(std::numbers::inv_pi);
   }
 
-  /// As a lookup in the lightmap has it: between the middles of leaves.
   [[nodiscard]] glm::vec3 radiosityAt(const solver::LeafRays::Place& place, std::uint32_t value) const {
-    if (place.value != value) return radiosity_[value];
+    const auto arrives = place.value == value ? irradianceAt(place) : irradiance_[value];
+    return own_[value] + reflectance_[value] * arrives;
+  }
+
+  /// As a lookup in the lightmap has it: between the middles of leaves.
+  [[nodiscard]] glm::vec3 irradianceAt(const solver::LeafRays::Place& place) const {
+    const auto value = place.value;
     const auto& side = rays_->sideOf(value);
     const glm::dvec2 last(side.width - 1, side.height - 1);
     const auto at = glm::clamp(rays_->texelOf(place) - 0.5, glm::dvec2(0.0), last);
@@ -108,10 +111,10 @@ class MirrorView {
       const auto beside = side.first_value + y * side.width + x;
       if (rays_->areaOf(beside) <= 0.0) continue;
       const double weight = (k % 2 == 1 ? part.x : 1.0 - part.x) * (k / 2 == 1 ? part.y : 1.0 - part.y);
-      sum += weight * glm::dvec3(radiosity_[beside]);
+      sum += weight * glm::dvec3(irradiance_[beside]);
       weights += weight;
     }
-    return weights > 0.0 ? glm::vec3(sum / weights) : radiosity_[value];
+    return weights > 0.0 ? glm::vec3(sum / weights) : irradiance_[value];
   }
 
   const MirrorScene& scene_;
@@ -120,7 +123,7 @@ class MirrorView {
   std::vector<solver::Side> sides_;
   std::shared_ptr<const solver::SpecularLeaves> mirrors_;
   std::optional<solver::LeafRays> rays_;
-  std::vector<glm::vec3> radiosity_;  ///< by leaf value
+  std::vector<glm::vec3> irradiance_, reflectance_, own_;  ///< by leaf value; `own_`: all but what is reflected
 };
 
 }  // namespace

@@ -298,6 +298,8 @@ StepOutcome LinkedSolver::chooseRays() {
   if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
   const double norm = fieldNorm(), of_images = gather_->imageNoise() / std::max(norm * norm, 1e-300);
   if (of_images > kImages * room && gather_->refineImages(of_images / (kImages * room))) return StepOutcome::kRoundDone;
+  // What is left of that is not theirs to lower.
+  const double room_beside = std::max(room - of_images, kLeastRoom * room);
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   // Samples alone lowered nothing: what halves of the rays differ by after some bounces was taken for the links'.
@@ -305,23 +307,23 @@ StepOutcome LinkedSolver::chooseRays() {
   if (links_cost <= 0.0 || in_vain) rays += std::exchange(links, 0.0);  // under a sky there may be none
   double best = HUGE_VAL, part = 0.0;
   for (int i = 1; i < kParts; ++i) {
-    const double for_rays = room * i / kParts, for_links = room - for_rays;
+    const double for_rays = room_beside * i / kParts, for_links = room_beside - for_rays;
     // The square of the error of samples falls as their number.
     const double cost = rays_cost * LeafGather::timesFor(for_rays / std::max(rays, 1e-300)) +
                         links_cost * std::max(1.0, links / for_links);
     if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
   }
-  const double goal_of_rays = part * room / std::max(rays, 1e-300) * gather_->rayNoise();
-  const bool refined = rays > part * room && gather_->refine(goal_of_rays, {blotch(), blotch()});
+  const double goal_of_rays = part * room_beside / std::max(rays, 1e-300) * gather_->rayNoise();
+  const bool refined = rays > part * room_beside && gather_->refine(goal_of_rays, {blotch(), blotch()});
   const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kRays;
-  if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
-    const double goal = std::max(room - rays, rays);
+  if (!refined && rays > part * room_beside) {  // no more to be had: links get what they leave, or as good as they are
+    const double goal = std::max(room_beside - rays, rays);
     if (links <= goal) return exhausted(end);
     sampled_alone_ = by_links_;
     sample_goal_ = std::sqrt(goal);
     return StepOutcome::kRoundDone;
   }
-  if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);
+  if (links > (1.0 - part) * room_beside) sample_goal_ = std::sqrt((1.0 - part) * room_beside);
   if (!refined && sample_goal_ <= 0.0) return exhausted(end);
   sampled_alone_ = refined ? 0.0 : by_links_;
   return StepOutcome::kRoundDone;

@@ -1,7 +1,6 @@
 #include "server/solver/reflected/imaged_light.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -27,6 +26,8 @@ constexpr std::uint32_t kRays = 2;
 constexpr double kAround = 1.5;
 /// First looks of leaves that are looked from together: a few hundredths of a second.
 constexpr std::uint32_t kLeavesAtOnce = 4096;
+/// Of the rows that are looked from together two are so for their neighbours alone.
+constexpr std::uint32_t kLeastRows = 8;
 /// In a step there come to be at most so many times as many looks.
 constexpr double kMostAStep = 4.0;
 /// Of all room, what images may take that are no longer there.
@@ -65,6 +66,8 @@ std::uint64_t ImagedLight::looksFor(const Lamps& lamps) const {
 
 void ImagedLight::begin(Lamps lamps, const LeafShading* shading) {
   if (is_given_up_) lamps = {};
+  pending_ = {};
+  next_ = 0;
   if (shading != std::exchange(shading_, shading)) known_.clear(), spare_.clear();
   std::vector<OfImage> next;
   std::vector<std::uint32_t> unknown;
@@ -80,8 +83,6 @@ void ImagedLight::begin(Lamps lamps, const LeafShading* shading) {
   keepSpare();
   known_ = std::move(next);
   lamps_ = std::move(lamps);
-  pending_.clear();
-  next_ = 0;
   for (const auto image : unknown) plan(image);
 }
 
@@ -90,14 +91,14 @@ void ImagedLight::keepSpare() {
   std::ranges::move(known_, std::back_inserter(spare_));
   known_.clear();
   std::erase_if(spare_, [&](const OfImage& image) { return !image.is_whole || image.times != times_; });
-  while (bytes() > most_bytes_ / kSparePart) spare_.erase(spare_.begin());
+  while (!spare_.empty() && bytes() > most_bytes_ / kSparePart) spare_.erase(spare_.begin());
 }
 
 void ImagedLight::plan(std::uint32_t image) {
   std::uint32_t parts = 0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     const auto& side = sides_[s];
-    const auto rows = std::max(1U, kLeavesAtOnce / (times_ * std::max(1U, side.width)));
+    const auto rows = std::max(kLeastRows, kLeavesAtOnce / (times_ * std::max(1U, side.width)));
     for (std::uint32_t first = 0; first < side.height; first += rows, ++parts)
       pending_.push_back({image, s, first, std::min(side.height, first + rows)});
   }
@@ -130,6 +131,7 @@ bool ImagedLight::advance(double seconds) {
     } while (std::chrono::duration<double>(Clock::now() - begin).count() < seconds);
   });
   next_ = std::min(pending_.size(), next.load());
+  if (bytes() > most_bytes_) spare_.clear();
   if (bytes() > most_bytes_) giveUp();
   const auto unfinished = next_ < pending_.size() ? pending_[next_].image : known_.size();
   for (std::size_t i = 0; i < unfinished; ++i) known_[i].is_whole = true;
@@ -208,25 +210,25 @@ std::uint32_t ImagedLight::lookFrom(const LampImages::Image& image, std::uint32_
   const auto& side = rays_->sideOf(leaf.value);
   const auto of_leaf = mixKeys(mixKeys(seed_ ^ kSeed, side.key), leaf.value - side.first_value);
   const auto& images = *lamps_.images;
+  thread_local std::vector<LeafRays::Place> places;
+  places.resize(looks);
   std::uint32_t seen = 0;
   for (std::size_t half = 0; half < 2; ++half) {
     const Sobol4 draws(mixKeys(mixKeys(of_leaf, image.key), half));
-    std::array<LeafRays::Place, kAllLooks> places;
     LampImages::Looks geometric, shaded;
     for (std::uint32_t i = 0; i < looks; ++i) {
       const auto draw = draws(i);
-      auto& place = places[i % kAllLooks];
+      auto& place = places[i];
       place = rays_->placeOn(leaf.value, {draw.x, draw.y});
       geometric.add(images.look(image, place, place.normal, {draw.z, draw.w}));
       if (leaf.number != scene::kNone)
         shaded.add(images.look(image, place, glm::dvec3(shading_->normal(leaf.number)), {draw.z, draw.w}));
     }
-    const auto some = std::span(places).first(std::min(looks, kAllLooks));
     seen += geometric.seen_count;
-    leaf.light[half] = glm::vec3(images.irradiance(image, geometric, some));
+    leaf.light[half] = glm::vec3(images.irradiance(image, geometric, places));
     if (leaf.number == scene::kNone) continue;
     const glm::dvec3 normal(shading_->normal(leaf.number));
-    leaf.shaded[half] = glm::vec3(images.irradiance(image, shaded, some, &normal));
+    leaf.shaded[half] = glm::vec3(images.irradiance(image, shaded, places, &normal));
   }
   return seen;
 }
