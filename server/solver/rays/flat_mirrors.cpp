@@ -15,9 +15,9 @@ namespace {
 /// unit box is off by as much.
 constexpr double kSame = 2e-6;
 
-/// Of the area of all surfaces, mirrors in one plane reflect as much as this at least: what comes from less is not worth
-/// looking for from everywhere. A seat of glass in a room is as much, the edge of a table top less. With 1e-3 that room
-/// takes 14 s to 3 %, with this 5.4, with 3e-5 6.9.
+/// Of the area of all surfaces, mirrors in one plane reflect as much as this at least: what comes from less is not
+/// worth looking for from everywhere. A seat of glass in a room is as much, the edge of a table top less. With 1e-3
+/// that room takes 14 s to 3 %, with this 5.4, with 3e-5 6.9.
 constexpr double kLeastPart = 1e-4;
 
 bool isSharp(const SpecularLeaves& mirrors, std::uint32_t value) {
