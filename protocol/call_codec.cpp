@@ -222,10 +222,10 @@ std::optional<std::uint64_t> patchOperation(const std::string& pointer) {
   return op;
 }
 
-using Decoded = tl::expected<Call, RpcError>;
+using DecodedCall = tl::expected<Call, RpcError>;
 
 template <typename C>
-Decoded decodeAs(const json* object) {
+DecodedCall decodeCallAs(const json* object) {
   Reader reader(object, "/params");
   C call;
   read(reader, call);
@@ -236,12 +236,12 @@ Decoded decodeAs(const json* object) {
 
 struct Method {
   std::string_view name;
-  Decoded (*decode)(const json*);
+  DecodedCall (*decode)(const json*);
 };
 
 template <typename... C>
 constexpr auto methodsOf(std::variant<C...>* /*only its type counts*/) {
-  return std::array{Method{C::kMethod, &decodeAs<C>}...};
+  return std::array{Method{C::kMethod, &decodeCallAs<C>}...};
 }
 
 constexpr auto kMethods = methodsOf(static_cast<Call*>(nullptr));

@@ -13,18 +13,19 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::pair<ErrorCode, std::string_view>, 12> kCodes{{{ErrorCode::kBadUsage, "badUsage"},
-                                                                         {ErrorCode::kBadInput, "badInput"},
-                                                                         {ErrorCode::kInvalidScene, "invalidScene"},
-                                                                         {ErrorCode::kUnsupported, "unsupported"},
-                                                                         {ErrorCode::kNotFound, "notFound"},
-                                                                         {ErrorCode::kTooLarge, "tooLarge"},
-                                                                         {ErrorCode::kStaleRevision, "staleRevision"},
-                                                                         {ErrorCode::kTestFailed, "testFailed"},
-                                                                         {ErrorCode::kBusy, "busy"},
-                                                                         {ErrorCode::kUnavailable, "unavailable"},
-                                                                         {ErrorCode::kCancelled, "cancelled"},
-                                                                         {ErrorCode::kInternal, "internal"}}};
+constexpr std::array<std::pair<ErrorCode, std::string_view>, 12> kCodeNames{
+    {{ErrorCode::kBadUsage, "badUsage"},
+     {ErrorCode::kBadInput, "badInput"},
+     {ErrorCode::kInvalidScene, "invalidScene"},
+     {ErrorCode::kUnsupported, "unsupported"},
+     {ErrorCode::kNotFound, "notFound"},
+     {ErrorCode::kTooLarge, "tooLarge"},
+     {ErrorCode::kStaleRevision, "staleRevision"},
+     {ErrorCode::kTestFailed, "testFailed"},
+     {ErrorCode::kBusy, "busy"},
+     {ErrorCode::kUnavailable, "unavailable"},
+     {ErrorCode::kCancelled, "cancelled"},
+     {ErrorCode::kInternal, "internal"}}};
 
 std::string stringAt(const json& object, const char* key) {
   const auto found = object.find(key);
@@ -34,7 +35,7 @@ std::string stringAt(const json& object, const char* key) {
 }  // namespace
 
 std::string_view httpCode(ErrorCode code) {
-  for (const auto& [ours, text] : kCodes)
+  for (const auto& [ours, text] : kCodeNames)
     if (ours == code) return text;
   return "internal";
 }
@@ -54,7 +55,7 @@ Error decodeHttpError(int status, std::string_view body) {
   error.message = stringAt(*found, "message");
   error.where = stringAt(*found, "where");
   const auto code = stringAt(*found, "code");
-  for (const auto& [ours, text] : kCodes)
+  for (const auto& [ours, text] : kCodeNames)
     if (text == code) error.code = ours;
   return error;
 }

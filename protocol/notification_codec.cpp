@@ -115,10 +115,10 @@ void read(Reader& r, ServerNote& n) {
 }
 void read(Reader& r, SolveConfigured& n) { read(r, n.settings); }
 
-using Decoded = tl::expected<Notification, RpcError>;
+using DecodedNotification = tl::expected<Notification, RpcError>;
 
 template <typename N>
-Decoded decodeAs(const json* object) {
+DecodedNotification decodeNotificationAs(const json* object) {
   Reader reader(object, "/params");
   N note;
   read(reader, note);
@@ -128,12 +128,12 @@ Decoded decodeAs(const json* object) {
 
 struct Kind {
   std::string_view name;
-  Decoded (*decode)(const json*);
+  DecodedNotification (*decode)(const json*);
 };
 
 template <typename... N>
 constexpr auto kindsOf(std::variant<N...>* /*only its type counts*/) {
-  return std::array{Kind{N::kMethod, &decodeAs<N>}...};
+  return std::array{Kind{N::kMethod, &decodeNotificationAs<N>}...};
 }
 
 constexpr auto kKinds = kindsOf(static_cast<Notification*>(nullptr));

@@ -89,7 +89,7 @@ ExitCode texel(const TexelOptions& options) {
 }
 
 /// A server that makes a large scene answers when it has made it.
-constexpr auto kPatience = std::chrono::minutes(10);
+constexpr auto kLoadPatience = std::chrono::minutes(10);
 
 struct SnapshotOptions {
   RemoteOptions server;
@@ -103,16 +103,18 @@ std::optional<double>& exposureBefore() {
   return exposure;
 }
 
-std::optional<double> numberIn(const std::string& text) {
+std::optional<double> exposureIn(const std::string& text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
-std::optional<double> exposureOf(const std::string& text) { return text == "same" ? exposureBefore() : numberIn(text); }
+std::optional<double> exposureOf(const std::string& text) {
+  return text == "same" ? exposureBefore() : exposureIn(text);
+}
 
 std::string checkExposure(const std::string& text) {
-  const auto value = numberIn(text);
+  const auto value = exposureIn(text);
   const bool good = text == "auto" || text == "same" || (value && *value > 0.0 && *value <= protocol::kMaxExposure);
   return good ? std::string{} : "must be auto, same, or a number above 0: " + text;
 }
@@ -126,7 +128,7 @@ ExitCode snapshot(const SnapshotOptions& options) {
   if (!connection) return complain(connection.error());
   const auto made = connection->call(protocol::SnapshotCall{options.camera, options.width, options.height,
                                                             options.quantity, exposureOf(options.exposure)},
-                                     kPatience);
+                                     kLoadPatience);
   if (!made) return complain(made.error());
   const auto reply = client::httpGetToFile(remote->http(), made->url, *file);
   if (!reply) return complain(reply.error());

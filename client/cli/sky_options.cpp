@@ -22,7 +22,7 @@ bool isModel(const std::string& text) {
   return std::ranges::any_of(kModels, [&](const char* model) { return text == model; });
 }
 
-tl::unexpected<Error> bad(std::string what, std::string where) {
+tl::unexpected<Error> badOption(std::string what, std::string where) {
   return fail(ErrorCode::kBadUsage, std::move(what), std::move(where));
 }
 
@@ -45,7 +45,7 @@ Result<void> addSun(const std::string& sun, Json& daylight) {
   double latitude = 0.0, longitude = 0.0;
   if (at == std::string_view::npos || comma == std::string_view::npos ||
       !number(text.substr(at + 1, comma - at - 1), latitude) || !number(text.substr(comma + 1), longitude))
-    return bad("must be a time and a place, such as 2026-06-21T12:00+02:00@48.1,11.6", "--sun " + sun);
+    return badOption("must be a time and a place, such as 2026-06-21T12:00+02:00@48.1,11.6", "--sun " + sun);
   daylight["time"] = std::string(text.substr(0, at));
   daylight["latitude"] = latitude;
   daylight["longitude"] = longitude;
@@ -153,11 +153,11 @@ Result<SkyChoice> skyChoice(const SkyOptions& options) {
   const bool is_daylight = isModel(options.sky) || !options.sun.empty();
   for (const auto& [given, name] : {std::pair(options.sun_angle.has_value(), "--sun-angle"),
                                     std::pair(options.turbidity.has_value(), "--turbidity")})
-    if (given && !is_daylight) return bad("needs --sun, or a model of daylight as --sky", name);
+    if (given && !is_daylight) return badOption("needs --sun, or a model of daylight as --sky", name);
   const auto colours = protocol::parseSky(options.sky);
   if (is_daylight) {
     if (!options.sky.empty() && !isModel(options.sky))
-      return bad("goes with a model of daylight as --sky alone", "--sun");
+      return badOption("goes with a model of daylight as --sky alone", "--sun");
     auto daylight = daylightOf(options);
     if (!daylight) return tl::unexpected(daylight.error());
     choice.sky = {{"daylight", std::move(*daylight)}};
@@ -166,16 +166,18 @@ Result<SkyChoice> skyChoice(const SkyOptions& options) {
   } else if (!options.sky.empty()) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(options.sky, error))
-      return bad("is no file, no model (clear, intermediate, overcast, perez), and no nits: " + colours.error().message,
-                 "--sky " + options.sky);
+      return badOption(
+          "is no file, no model (clear, intermediate, overcast, perez), and no nits: " + colours.error().message,
+          "--sky " + options.sky);
     if (std::filesystem::file_size(options.sky, error) > kMostPictureBytes || error)
-      return bad("has more than 1 GiB", "--sky " + options.sky);
+      return badOption("has more than 1 GiB", "--sky " + options.sky);
     choice.picture = options.sky;
     choice.sky = Json::object();
   }
   for (const auto& [value, name] : {std::pair(options.rotation, "rotation"), std::pair(options.strength, "strength")}) {
     if (!value) continue;
-    if (!choice.isOfScene()) return bad("needs a picture or a model as --sky, or --sun", std::string("--sky-") + name);
+    if (!choice.isOfScene())
+      return badOption("needs a picture or a model as --sky, or --sun", std::string("--sky-") + name);
     choice.sky[name] = *value;
   }
   return choice;

@@ -19,7 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kStatusInterval = 1000ms;
+constexpr auto kRefreshInterval = 1000ms;
 
 struct WatchOptions {
   RemoteOptions server;
@@ -77,9 +77,9 @@ class Watch {
       target_error_ = status->settings.target_error;
       show(status->progress);
       if (const auto code = ending(status->progress)) return code;
-      const auto next = std::chrono::steady_clock::now() + kStatusInterval;
+      const auto next = std::chrono::steady_clock::now() + kRefreshInterval;
       while (!interrupted() && !ask_now_ && std::chrono::steady_clock::now() < next) {
-        if (const auto polled = connection.poll(kStatusInterval); !polled) {
+        if (const auto polled = connection.poll(kRefreshInterval); !polled) {
           why = polled.error().text();
           return std::nullopt;
         }

@@ -8,7 +8,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr std::uint32_t kLeafSize = 4;
+constexpr std::uint32_t kFacesALeaf = 4;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ void FacingTree::divide(std::size_t n, std::span<const Item> items) {
     sizes += item.high - item.low;
   }
   nodes_[n].reach = reach;
-  if (count <= kLeafSize) return;
+  if (count <= kFacesALeaf) return;
   // Walls that lie through each other are parted across them: along them all halves would reach as far.
   const auto place = middles.high - middles.low - sizes / static_cast<float>(count);
   const auto turn = middles.normal_high - middles.normal_low;

@@ -18,9 +18,9 @@ constexpr std::uint32_t kLongest = 64;
 
 int compare(const Corners& a, const Corners& b) { return std::memcmp(a.data(), b.data(), sizeof(Corners)); }
 
-class Search {
+class SameSearch {
  public:
-  Search(std::span<const Corners> triangles, const std::vector<bool>& kind) : triangles_(triangles), kind_(kind) {}
+  SameSearch(std::span<const Corners> triangles, const std::vector<bool>& kind) : triangles_(triangles), kind_(kind) {}
 
   /// From the last to the first: the table, of open addressing, holds the first so far. Nothing: a run gets too long.
   std::optional<SameTriangles> byHash() {
@@ -84,8 +84,8 @@ std::uint64_t hashOfCorners(const Corners& corners) {
 }
 
 SameTriangles findSame(std::span<const Corners> triangles, const std::vector<bool>& kind) {
-  if (auto same = Search(triangles, kind).byHash()) return *std::move(same);
-  return Search(triangles, kind).byOrder();
+  if (auto same = SameSearch(triangles, kind).byHash()) return *std::move(same);
+  return SameSearch(triangles, kind).byOrder();
 }
 
 }  // namespace radiosity::geometry

@@ -115,9 +115,9 @@ Box around(std::span<const Box> boxes) {
 
 /// Halves the triangles again and again, and looks at those pairs that lie across from each other where the boxes of
 /// the halves meet.
-class Search {
+class CrossingSearch {
  public:
-  explicit Search(std::span<const Corners> triangles)
+  explicit CrossingSearch(std::span<const Corners> triangles)
       : triangles_(triangles), left_(kPairsEach * triangles.size() + kPairsAtLeast) {}
 
   [[nodiscard]] bool areClear(std::span<Box> boxes) {
@@ -173,7 +173,7 @@ bool keepsClearOfItself(std::span<const Corners> triangles) {
   boxes.reserve(triangles.size());
   for (const auto& [a, b, c] : triangles)
     boxes.push_back({glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c), boxes.size()});
-  return Search(triangles).areClear(boxes);
+  return CrossingSearch(triangles).areClear(boxes);
 }
 
 }  // namespace radiosity::scene

@@ -8,7 +8,7 @@ namespace radiosity::scene {
 namespace {
 
 /// Boxes are larger by this (unit box): well above what rounding moves positions.
-constexpr float kMargin = 1e-5F;
+constexpr float kBoxMargin = 1e-5F;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
     Bounds box;
     for (const auto& triangle : parts[p])
       for (const auto& corner : triangle) box.add(corner);
-    boxes.push_back({box.min - kMargin, box.max + kMargin, box.max + kMargin});
+    boxes.push_back({box.min - kBoxMargin, box.max + kBoxMargin, box.max + kBoxMargin});
     if (p % 2 == kClosed) closed.emplace_back(static_cast<std::uint32_t>(parts_.size()), parts[p]);
     add(std::move(parts[p]), p % 2 == kHollow);
   }

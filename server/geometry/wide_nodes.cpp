@@ -7,7 +7,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNoBound = std::numeric_limits<float>::infinity();
 /// Sides of boxes around whatever there is.
 constexpr float kEverywhere = 1e9F;
 /// By which boxes grow (unit box): by more than rounding moves their sides, and where a ray meets them.
@@ -45,8 +45,8 @@ WideNodes::WideNodes(const Bvh& tree, const NumberLeaf& leaf) {
     pending.pop_back();
     Node node;
     for (std::size_t axis = 0; axis < 3; ++axis) {  // no ray meets what is empty
-      node.plane[axis].fill(kInfinity);
-      node.plane[axis + 3].fill(-kInfinity);
+      node.plane[axis].fill(kNoBound);
+      node.plane[axis + 3].fill(-kNoBound);
     }
     node.child.fill(0);
     std::size_t k = 0;
@@ -98,8 +98,8 @@ std::uint32_t WideNodes::addLeaf(const NumberLeaf& leaf, std::uint32_t first, st
   nodes_.emplace_back();
   Node node;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    node.plane[axis].fill(kInfinity);
-    node.plane[axis + 3].fill(-kInfinity);
+    node.plane[axis].fill(kNoBound);
+    node.plane[axis + 3].fill(-kNoBound);
   }
   node.child.fill(0);
   const std::uint32_t part = std::max(kWidth, (count + kWidth - 1) / kWidth);

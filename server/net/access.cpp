@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <boost/asio/ip/address.hpp>
-#include <cctype>
 #include <string>
+
+#include "server/net/http_message.h"
 
 namespace radiosity::net {
 namespace {
-
-bool sameIgnoringCase(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
 
 /// "https://host:port" -> "host:port".
 std::string_view authorityOf(std::string_view origin) {

@@ -7,13 +7,6 @@
 namespace radiosity::net {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t";
-  const auto first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
-
 bool isChunked(std::string_view coding) {
   constexpr std::string_view kChunked = "chunked";
   return std::equal(coding.begin(), coding.end(), kChunked.begin(), kChunked.end(),

@@ -36,11 +36,6 @@ std::optional<std::string> percentDecoded(std::string_view text, bool plus_is_sp
   return out;
 }
 
-bool sameIgnoringCase(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
 int statusOf(ErrorCode code) {
   switch (code) {
     case ErrorCode::kBadUsage:
@@ -78,6 +73,18 @@ bool takeAuthority(std::string_view& target, std::string& authority) {
 }
 
 }  // namespace
+
+bool sameIgnoringCase(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const auto first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
 
 Result<HttpRequest> parseTarget(std::string_view method, std::string_view target) {
   HttpRequest request;

@@ -36,6 +36,11 @@ struct HttpResponse {
   std::vector<std::pair<std::string, std::string>> headers;
 };
 
+/// Of names and tokens, which are ASCII.
+[[nodiscard]] bool sameIgnoringCase(std::string_view a, std::string_view b);
+/// A header's value, or an element of its list, without the blanks around it.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+
 /// Authority, path and query of a request target in origin, absolute or asterisk form (RFC 9112, section 3.2);
 /// kBadInput for another form, a bad escape, a NUL or too many members.
 [[nodiscard]] Result<HttpRequest> parseTarget(std::string_view method, std::string_view target);

@@ -19,12 +19,6 @@ constexpr std::string_view kTranscoder = "/assets/transcode_worker";
 constexpr std::string_view kTranscoderPolicy =
     "default-src 'none'; script-src 'self' 'unsafe-eval'; connect-src 'self'; base-uri 'none'";
 
-std::string_view trimmed(std::string_view text) {
-  while (text.starts_with(' ') || text.starts_with('\t')) text.remove_prefix(1);
-  while (text.ends_with(' ') || text.ends_with('\t')) text.remove_suffix(1);
-  return text;
-}
-
 /// Calls `visit` for each element of a comma-separated header until it returns true.
 template <typename Visit>
 bool anyElement(std::string_view list, const Visit& visit) {

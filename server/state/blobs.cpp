@@ -13,7 +13,7 @@ namespace radiosity::state {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 32;
+constexpr std::uint64_t kMostBlobBytes = std::uint64_t{1} << 32;
 
 }  // namespace
 
@@ -90,7 +90,7 @@ Result<SharedBytes> Blobs::get(const std::string& id) {
     }
   }
   const auto file = folder_ / id;
-  auto bytes = readWhole(file, kMostBytes);
+  auto bytes = readWhole(file, kMostBlobBytes);
   if (!bytes) return tl::unexpected(bytes.error());
   if (sha256Hex(*bytes) != id)
     return fail(ErrorCode::kBadInput,

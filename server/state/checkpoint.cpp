@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kMagic = "radiosity checkpoint 1\n";
 constexpr std::size_t kIdBytes = 64;
 constexpr std::size_t kHeaderBytes = kMagic.size() + 2 * (kIdBytes + 1);
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 36;
+constexpr std::uint64_t kMostCheckpointBytes = std::uint64_t{1} << 36;
 
 /// Magic, program and digest of the body, each ended by a line feed.
 std::string headerOf(const std::string& program, std::span<const std::uint8_t> body) {
@@ -29,7 +29,7 @@ std::string headerOf(const std::string& program, std::span<const std::uint8_t> b
 
 const std::string& programId() {
   static const std::string kId = [] {
-    const auto program = readWhole("/proc/self/exe", kMostBytes);
+    const auto program = readWhole("/proc/self/exe", kMostCheckpointBytes);
     if (program) return sha256Hex(std::span(*program));
     log::warn("no checkpoints: {}", program.error().text());
     return std::string();
@@ -38,7 +38,7 @@ const std::string& programId() {
 }
 
 Result<std::optional<Bytes>> readCheckpoint(const fs::path& file) {
-  auto bytes = readWhole(file, kMostBytes);
+  auto bytes = readWhole(file, kMostCheckpointBytes);
   if (!bytes && bytes.error().code == ErrorCode::kNotFound) return std::optional<Bytes>();
   if (!bytes) return tl::unexpected(bytes.error());
   const auto at = [&](std::size_t first, std::size_t count) {

@@ -17,8 +17,8 @@ namespace radiosity::test {
 namespace {
 
 using scene::LightKind;
+using std::numbers::pi;
 
-constexpr double kPi = std::numbers::pi;
 constexpr std::uint32_t kTexels = 16;
 
 scene::PunctualLight lampOf(LightKind kind, const glm::dvec2& half, const glm::dvec3& at = {0.1, -0.2, 0.3}) {
@@ -40,7 +40,7 @@ scene::SharedWeb cosineWeb() {
   std::vector<float> polar, candela;
   for (int i = 0; i <= 90; ++i) {
     polar.push_back(static_cast<float>(i));
-    candela.push_back(static_cast<float>(1000.0 * std::cos(i * kPi / 180.0)));
+    candela.push_back(static_cast<float>(1000.0 * std::cos(i * pi / 180.0)));
   }
   return webOf(polar, candela);
 }
@@ -110,10 +110,10 @@ TEST_P(Lamps, ARectangleOverAPlaneIsItsFormFactor) {
       {{-0.1F, -0.3F, 0.3F}, {-0.1F, -0.1F, 0.3F}, {0.3F, -0.1F, 0.3F}, {0.3F, -0.3F, 0.3F}}};
   EXPECT_LT(worst(floor,
                   [&](const glm::dvec3& at) {
-                    return 3.0 * kPi * solver::polygonFormFactor(at, {0, 0, 1}, corners);
+                    return 3.0 * pi * solver::polygonFormFactor(at, {0, 0, 1}, corners);
                   }),
             kEightPlaces);
-  EXPECT_NEAR(emitted_, 3.0 * kPi * 0.08, 1e-6);
+  EXPECT_NEAR(emitted_, 3.0 * pi * 0.08, 1e-6);
   expectBalance(0.01);
 }
 
@@ -122,10 +122,10 @@ TEST_P(Lamps, ADiscOverAPlaneIsItsFormFactor) {
   light(lampOf(LightKind::kDisc, {0.25, 0.25}));
   EXPECT_LT(worst(floor,
                   [](const glm::dvec3& at) {
-                    return 3.0 * kPi * solver::discFormFactor(at, {0, 0, 1}, {0.1, -0.2, 0.3}, {0, 0, -1}, 0.25);
+                    return 3.0 * pi * solver::discFormFactor(at, {0, 0, 1}, {0.1, -0.2, 0.3}, {0, 0, -1}, 0.25);
                   }),
             kEightPlaces);
-  EXPECT_NEAR(emitted_, 3.0 * kPi * kPi * 0.0625, 1e-6);
+  EXPECT_NEAR(emitted_, 3.0 * pi * pi * 0.0625, 1e-6);
   expectBalance(0.01);
 }
 
@@ -138,7 +138,7 @@ TEST_P(Lamps, ABallOutsideIsAPointOfItsFlux) {
                     return 3.0 * d.z / std::pow(glm::length(d), 3.0);
                   }),
             kEightPlaces);
-  EXPECT_NEAR(emitted_, 12.0 * kPi, 1e-5);
+  EXPECT_NEAR(emitted_, 12.0 * pi, 1e-5);
   expectBalance(0.01);
 }
 
@@ -152,7 +152,7 @@ TEST_P(Lamps, ASmallSpotIsASpot) {
   const double exact = 3.0 / 0.64;
   const auto x = static_cast<std::uint32_t>(0.6 * kTexels), y = static_cast<std::uint32_t>(0.3 * kTexels);
   EXPECT_NEAR(irradiance(floor, x, y), exact, 0.02 * exact) << "right below";
-  EXPECT_NEAR(emitted_, 3.0 * 2.0 * kPi * ((inner - outer) / 3.0 + 1.0 - inner), 1e-3);
+  EXPECT_NEAR(emitted_, 3.0 * 2.0 * pi * ((inner - outer) / 3.0 + 1.0 - inner), 1e-3);
   expectBalance(0.01);
 }
 
@@ -167,7 +167,7 @@ TEST_P(Lamps, AWebThatIsTheSameAllAroundIsAPointLight) {
                     return 21.0 * d.z / std::pow(glm::length(d), 3.0);
                   }),
             kEightPlaces);
-  EXPECT_NEAR(emitted_, 21.0 * 4.0 * kPi, 1e-3);
+  EXPECT_NEAR(emitted_, 21.0 * 4.0 * pi, 1e-3);
   expectBalance(0.01);
 }
 
@@ -176,11 +176,11 @@ TEST_P(Lamps, AWebOfCosinesIsASmallDisc) {
   auto lamp = lampOf(LightKind::kWeb, {});
   lamp.web = cosineWeb();
   light(lamp);
-  const double area = kPi * 1e-4;
+  const double area = pi * 1e-4;
   EXPECT_LT(
       worst(floor,
             [&](const glm::dvec3& at) {
-              return 3000.0 / area * kPi * solver::discFormFactor(at, {0, 0, 1}, {0.1, -0.2, 0.3}, {0, 0, -1}, 0.01);
+              return 3000.0 / area * pi * solver::discFormFactor(at, {0, 0, 1}, {0.1, -0.2, 0.3}, {0, 0, -1}, 0.01);
             }),
       kEightPlaces);
 }
@@ -197,7 +197,7 @@ TEST_P(Lamps, ABeamOfFiveDegreesIsNeitherLostNorNoisy) {
   lamp.web = webOf(polar, candela);
   light(lamp);
   for (const double away : {0.0, 1.0, 1.7, 3.5}) {  // degrees
-    const glm::dvec3 at(0.1 + 0.8 * std::tan(away * kPi / 180.0), -0.2, -0.5);
+    const glm::dvec3 at(0.1 + 0.8 * std::tan(away * pi / 180.0), -0.2, -0.5);
     const auto x = static_cast<std::uint32_t>((at.x + 0.5) * kFine);
     const auto way = glm::dvec3(lamp.position) - glm::dvec3((x + 0.5) / kFine - 0.5, 38.5 / kFine - 0.5, -0.5);
     const double exact = away < 3.0 ? 3000.0 * way.z / std::pow(glm::length(way), 3.0) : 0.0;
@@ -233,7 +233,7 @@ TEST_P(Lamps, ALampFlushWithACeilingLightsTheFloorAndNotTheCeiling) {
       {{-0.2F, -0.2F, 0.5F}, {-0.2F, 0.2F, 0.5F}, {0.2F, 0.2F, 0.5F}, {0.2F, -0.2F, 0.5F}}};
   EXPECT_LT(worst(floor,
                   [&](const glm::dvec3& at) {
-                    return 3.0 * kPi * solver::polygonFormFactor(at, {0, 0, 1}, corners);
+                    return 3.0 * pi * solver::polygonFormFactor(at, {0, 0, 1}, corners);
                   }),
             kEightPlaces);
   for (std::uint32_t x = 0; x < kTexels; ++x) EXPECT_EQ(irradiance(ceiling, x, 8), 0.0);
@@ -252,10 +252,10 @@ TEST_P(Lamps, BehindAnEdgeTheLightIsThatOfThePartWhichIsSeen) {
     for (double px = -0.5 + (x + 1.0 / 16) / kTexels; k < 8; ++k, px += 1.0 / 8 / kTexels) {
       for (int i = 0; i < 40; ++i) {
         for (int j = 0; j < 160; ++j) {
-          const double r = 0.2 * std::sqrt((i + 0.5) / 40), angle = 2.0 * kPi * (j + 0.5) / 160;
+          const double r = 0.2 * std::sqrt((i + 0.5) / 40), angle = 2.0 * pi * (j + 0.5) / 160;
           const glm::dvec3 way(r * std::cos(angle) - px, r * std::sin(angle) - 0.03125, 0.9);
           if (px + way.x * 0.5 / 0.9 > 0.0) continue;
-          exact += 3.0 * kPi * 0.04 * 0.9 * 0.9 / std::pow(glm::dot(way, way), 2.0) / (8 * 40 * 160);
+          exact += 3.0 * pi * 0.04 * 0.9 * 0.9 / std::pow(glm::dot(way, way), 2.0) / (8 * 40 * 160);
         }
       }
     }

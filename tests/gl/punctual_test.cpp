@@ -16,7 +16,7 @@
 namespace radiosity::test {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 /// One receiving point, in the middle of the leaf, so that closed forms can be compared point by point.
 solver::ReceiverPoints middle() {
@@ -31,7 +31,7 @@ solver::PointShot downwardShot(const glm::vec3& origin) {
   shot.frame.normal = {0, 0, -1};
   shot.frame.tangent = {1, 0, 0};
   shot.intensity = {3.0, 0.5, 0.0};
-  for (std::size_t c = 0; c < 3; ++c) shot.emitted[c] = 2.0 * kPi * shot.intensity[c];
+  for (std::size_t c = 0; c < 3; ++c) shot.emitted[c] = 2.0 * pi * shot.intensity[c];
   shot.receivers = middle();
   return shot;
 }
@@ -172,7 +172,7 @@ TEST_P(Punctual, AClosedBoxReceivesAllThatAPointLightEmits) {
   const auto scene = builder.build();
   const solver::LightSources sources{{{.position = {0.2, 0.1, -0.1}, .intensity = {3.0F, 0.0F, 0.0F}}}, {}};
   const auto flux = runRound(scene, sources);
-  const double emitted = 4.0 * kPi * 3.0;
+  const double emitted = 4.0 * pi * 3.0;
   // Receiving points are jittered: 32 points a leaf over the round, on which irradiance varies by tens of percent.
   EXPECT_NEAR(static_cast<double>(flux.gathered[0]) / kFluxScale, emitted, 0.01 * emitted);
   EXPECT_EQ(flux.escaped[0], 0);
@@ -208,8 +208,8 @@ TEST_P(Punctual, AnOpenPlaneUnderTheSkyReceivesPiTimesItsRadiance) {
   const auto flux = runRound(scene, sources);
   EXPECT_GT(scene->triangles[scene->surfaces[floor].first_triangle].normal.y, 0.99F);
   // The wall stands a little in the floor's sky, the floor in the wall's lower half: the leaves here are out of both.
-  EXPECT_NEAR(irradiance(*scene, flux, floor, 0, 0), 2.0 * kPi, 0.02 * 2.0 * kPi);
-  EXPECT_NEAR(irradiance(*scene, flux, wall, 0, 3), (2.0 + 0.5) * kPi / 2.0, 0.02 * 2.5 * kPi / 2.0);
+  EXPECT_NEAR(irradiance(*scene, flux, floor, 0, 0), 2.0 * pi, 0.02 * 2.0 * pi);
+  EXPECT_NEAR(irradiance(*scene, flux, wall, 0, 3), (2.0 + 0.5) * pi / 2.0, 0.02 * 2.5 * pi / 2.0);
 }
 
 TEST_P(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExactly) {
@@ -221,13 +221,13 @@ TEST_P(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExa
   const auto flux = runRound(scene, sources);
   for (std::uint32_t face = 0; face < 6; ++face) {
     const double up = static_cast<double>(scene->triangles[scene->surfaces[first + face].first_triangle].normal.y);
-    const double exact = kPi * (2.0 * (1.0 + up) + 0.5 * (1.0 - up)) / 2.0;
+    const double exact = pi * (2.0 * (1.0 + up) + 0.5 * (1.0 - up)) / 2.0;
     for (std::uint32_t leaf = 0; leaf < 16; ++leaf) {
       EXPECT_NEAR(irradiance(*scene, flux, first + face, leaf % 4, leaf / 4), exact, 1e-5 * exact) << "face " << face;
     }
   }
   // What enters the box enters the solid, which fills it.
-  const double entered = 6.0 * 0.36 * kPi * (2.0 + 0.5) / 2.0;
+  const double entered = 6.0 * 0.36 * pi * (2.0 + 0.5) / 2.0;
   EXPECT_NEAR(total(flux), entered, 0.01 * entered);
 }
 
@@ -253,7 +253,7 @@ TEST_P(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees)
   sources.sky = {glm::vec3(1.0F), glm::vec3(0.0F)};
   const auto flux = runRound(scene, sources);
   // The wall's half of the places gets half of the upper sky. Each direction looks at one place of the leaf.
-  EXPECT_NEAR(irradiance(*scene, flux, below, 0, 0), 0.5 * kPi / 2.0, 0.25 * kPi / 2.0);
+  EXPECT_NEAR(irradiance(*scene, flux, below, 0, 0), 0.5 * pi / 2.0, 0.25 * pi / 2.0);
 }
 
 TEST_P(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {

@@ -9,7 +9,7 @@
 namespace radiosity::oracle {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 glm::dvec3 normalSum(std::span<const glm::dvec3> polygon) {
   glm::dvec3 sum(0.0);
@@ -44,7 +44,7 @@ double lambert(const glm::dvec3& point, const glm::dvec3& normal, std::span<cons
     const double sine = glm::length(perpendicular);
     if (sine > 0.0) sum += std::atan2(sine, glm::dot(a, b)) * glm::dot(perpendicular, normal) / sine;
   }
-  return sum / (2.0 * kPi);
+  return sum / (2.0 * pi);
 }
 
 /// Removes from `pieces` what the occluder hides from the point.
@@ -73,7 +73,7 @@ std::vector<Corners> cutShadow(std::vector<Corners> pieces, const glm::dvec3& po
   return visible;
 }
 
-using Triangle = std::array<glm::dvec3, 3>;
+using ThreeCorners = std::array<glm::dvec3, 3>;
 
 struct Integrand {
   glm::dvec3 normal;
@@ -84,7 +84,7 @@ struct Integrand {
 };
 
 /// Mean over a triangle by the 7-point rule of degree 5 (Radon 1948; Strang and Fix 1973, no. 5).
-double meanOver(const Triangle& t, const Integrand& f) {
+double meanOver(const ThreeCorners& t, const Integrand& f) {
   const double root = std::sqrt(15.0);
   const double a = (6.0 - root) / 21.0;
   const double b = (6.0 + root) / 21.0;
@@ -99,11 +99,11 @@ double meanOver(const Triangle& t, const Integrand& f) {
   return sum;
 }
 
-double adaptiveMean(const Triangle& t, const Integrand& f, double coarse, double tolerance, int depth) {
+double adaptiveMean(const ThreeCorners& t, const Integrand& f, double coarse, double tolerance, int depth) {
   const auto ab = 0.5 * (t[0] + t[1]);
   const auto bc = 0.5 * (t[1] + t[2]);
   const auto ca = 0.5 * (t[2] + t[0]);
-  const std::array<Triangle, 4> quarters{{{t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}, {ab, bc, ca}}};
+  const std::array<ThreeCorners, 4> quarters{{{t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}, {ab, bc, ca}}};
   std::array<double, 4> means{};
   for (std::size_t i = 0; i < 4; ++i) means[i] = meanOver(quarters[i], f);
   const double fine = 0.25 * (means[0] + means[1] + means[2] + means[3]);
@@ -127,7 +127,7 @@ double parallelRectangles(double width, double depth, double distance) {
   const double ry = std::sqrt(1.0 + y * y);
   const double sum = 0.5 * std::log(rx * rx * ry * ry / (1.0 + x * x + y * y)) + x * ry * std::atan(x / ry) +
                      y * rx * std::atan(y / rx) - x * std::atan(x) - y * std::atan(y);
-  return 2.0 / (kPi * x * y) * sum;
+  return 2.0 / (pi * x * y) * sum;
 }
 
 double perpendicularRectangles(double edge, double from_depth, double to_depth) {
@@ -139,7 +139,7 @@ double perpendicularRectangles(double edge, double from_depth, double to_depth) 
   const double all = 1.0 + w2 + h2;
   const double logs = std::log((1.0 + w2) * (1.0 + h2) / all) + w2 * std::log(w2 * all / ((1.0 + w2) * (w2 + h2))) +
                       h2 * std::log(h2 * all / ((1.0 + h2) * (w2 + h2)));
-  return (w * std::atan(1.0 / w) + h * std::atan(1.0 / h) - d * std::atan(1.0 / d) + 0.25 * logs) / (kPi * w);
+  return (w * std::atan(1.0 / w) + h * std::atan(1.0 / h) - d * std::atan(1.0 / d) + 0.25 * logs) / (pi * w);
 }
 
 double coaxialDiscs(double from_radius, double to_radius, double distance) {
@@ -182,7 +182,7 @@ double formFactor(const Corners& from, const Corners& to, std::span<const Corner
   const double whole = area(from);
   double sum = 0.0;
   for (std::size_t i = 1; i + 1 < from.size(); ++i) {
-    const Triangle triangle{from[0], from[i], from[i + 1]};
+    const ThreeCorners triangle{from[0], from[i], from[i + 1]};
     const double mean = meanOver(triangle, f);
     const double better =
         options.tolerance > 0.0 ? adaptiveMean(triangle, f, mean, options.tolerance, options.max_depth) : mean;

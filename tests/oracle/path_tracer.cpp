@@ -22,7 +22,7 @@
 namespace radiosity::oracle {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::uint32_t kBatches = 8;  // independent shifts: their spread is the standard error
 
 struct Point {
@@ -279,7 +279,7 @@ class PathTracer::Scene {
     if (!sees(at, y, random)) return glm::dvec3(0.0);
     const double density = light_density_[t] * distance2 / cos_light;  // per steradian
     const double there = opacityAt(light, y.position);
-    return emissionAt(light, y.position) * (there * cos_at / kPi / (density + cos_at / kPi));
+    return emissionAt(light, y.position) * (there * cos_at / pi / (density + cos_at / pi));
   }
 
   /// The picture of the sky in a direction drawn by its light, weighted against meeting it by a cosine ray.
@@ -290,14 +290,14 @@ class PathTracer::Scene {
     const double density = sky_map_.density(direction);
     if (cosine <= 0.0 || density <= 0.0) return glm::dvec3(0.0);
     if (!seesLamp(at, direction, std::numeric_limits<double>::infinity(), random)) return glm::dvec3(0.0);
-    return sky_map_.radiance(direction) * (cosine / (density + cosine / kPi));
+    return sky_map_.radiance(direction) * (cosine / (density + cosine / pi));
   }
 
   /// The other part of that: what a cosine ray that leaves the scene finds.
   [[nodiscard]] glm::dvec3 mapByCosine(const Point& at, const glm::dvec3& direction) const {
     if (sky_map_.empty()) return glm::dvec3(0.0);
     const double cosine = std::max(1e-12, glm::dot(direction, at.shading));
-    return sky_map_.radiance(direction) * (cosine / (sky_map_.density(direction) + cosine / kPi));
+    return sky_map_.radiance(direction) * (cosine / (sky_map_.density(direction) + cosine / pi));
   }
 
   /// One sample of irradiance: H(x) = direct + mean over cosine directions of rho(y) H(y).
@@ -315,7 +315,7 @@ class PathTracer::Scene {
       if (bounce == 0) count(hit, tally);
       // The colours of the sky are met by cosine rays only: pi times their radiance is the mean over them.
       if (!hit)
-        return sum + throughput * (kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_) + mapByCosine(at, direction));
+        return sum + throughput * (pi * (direction.y > 0.0 ? sky_upper_ : sky_lower_) + mapByCosine(at, direction));
       if (isBlackBack(*hit)) return sum;
       sum += throughput * metByCosine(at, direction, *hit);
       if (has_mirrors_) {
@@ -354,8 +354,8 @@ class PathTracer::Scene {
                        glm::dot(direction, hit->point.normal) > 0.0 ? hit->point.normal : -hit->point.normal};
       hit = see_through_ ? traceThrough(from, direction, random) : trace(from, direction);
       if (!hit) {
-        sum += part * kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_);
-        if (!sky_map_.empty()) sum += part * kPi * sky_map_.radiance(direction);
+        sum += part * pi * (direction.y > 0.0 ? sky_upper_ : sky_lower_);
+        if (!sky_map_.empty()) sum += part * pi * sky_map_.radiance(direction);
         return sum;
       }
       if (isBlackBack(*hit)) break;
@@ -378,7 +378,7 @@ class PathTracer::Scene {
   /// What a cosine ray meets shines by the other part of the balance heuristic (`direct`).
   [[nodiscard]] glm::dvec3 metByCosine(const Point& at, const glm::dvec3& direction, const Hit& hit) const {
     if (light_density_[hit.triangle] <= 0.0) return glm::dvec3(0.0);
-    const double by_cosine = glm::dot(direction, at.shading) / kPi;
+    const double by_cosine = glm::dot(direction, at.shading) / pi;
     const double cos_light = std::max(1e-12, -glm::dot(direction, hit.point.normal));
     const double by_light = light_density_[hit.triangle] * hit.distance * hit.distance / cos_light;
     return emissionAt(triangles()[hit.triangle], hit.point.position) * (by_cosine / (by_cosine + by_light));

@@ -11,7 +11,7 @@
 namespace radiosity::oracle {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 glm::dvec3 aboutY(const glm::dvec3& d, double angle) {
   return {std::cos(angle) * d.x + std::sin(angle) * d.z, d.y, std::cos(angle) * d.z - std::sin(angle) * d.x};
@@ -21,15 +21,15 @@ glm::dvec3 aboutY(const glm::dvec3& d, double angle) {
 
 std::size_t SkyMap::texelAt(const glm::dvec3& direction) const {
   const auto d = aboutY(direction, -turn_rad);
-  const double across = 0.5 + std::atan2(d.z, d.x) / (2.0 * kPi), down = std::acos(std::clamp(d.y, -1.0, 1.0)) / kPi;
+  const double across = 0.5 + std::atan2(d.z, d.x) / (2.0 * pi), down = std::acos(std::clamp(d.y, -1.0, 1.0)) / pi;
   const auto x = std::min(width - 1, static_cast<std::size_t>(across * static_cast<double>(width)));
   const auto y = std::min(height - 1, static_cast<std::size_t>(down * static_cast<double>(height)));
   return y * width + x;
 }
 
 double SkyMap::solidAngle(std::size_t row) const {
-  const double step = kPi / static_cast<double>(height), top = static_cast<double>(row) * step;
-  return 2.0 * kPi / static_cast<double>(width) * (std::cos(top) - std::cos(top + step));
+  const double step = pi / static_cast<double>(height), top = static_cast<double>(row) * step;
+  return 2.0 * pi / static_cast<double>(width) * (std::cos(top) - std::cos(top + step));
 }
 
 glm::dvec3 SkyMap::radiance(const glm::dvec3& direction) const { return nits[texelAt(direction)]; }
@@ -52,8 +52,8 @@ glm::dvec3 SkyMap::draw(double u, double v) const {
   const auto i = static_cast<std::size_t>(found - cumulative_.begin());
   const double low = i > 0 ? cumulative_[i - 1] : 0.0;
   const double within = std::clamp((target - low) / std::max(1e-300, cumulative_[i] - low), 0.0, 1.0);
-  const double azimuth = (2.0 * (static_cast<double>(i % width) + within) / static_cast<double>(width) - 1.0) * kPi;
-  const double step = kPi / static_cast<double>(height), top = static_cast<double>(i / width) * step;
+  const double azimuth = (2.0 * (static_cast<double>(i % width) + within) / static_cast<double>(width) - 1.0) * pi;
+  const double step = pi / static_cast<double>(height), top = static_cast<double>(i / width) * step;
   const double y = std::cos(top) + v * (std::cos(top + step) - std::cos(top)),
                ring = std::sqrt(std::max(0.0, 1.0 - y * y));
   return aboutY({ring * std::cos(azimuth), y, ring * std::sin(azimuth)}, turn_rad);

@@ -36,7 +36,7 @@ std::string summaryOf(const json& patch) {
   return changes == 0 ? "tests only" : shortened(text);
 }
 
-std::string textOf(const json& patch) { return patch.dump(-1, ' ', false, json::error_handler_t::replace); }
+std::string patchText(const json& patch) { return patch.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 std::size_t bytesOf(const state::Edit& edit) { return edit.forth.size() + edit.back.size(); }
 
@@ -72,11 +72,11 @@ History::Next History::nextEdit(std::uint64_t revision, const std::string& by, c
                                 const scene::TouchedParts& parts) const {
   Next next;
   next.entry = {revision, PastRevision::Kind::kPatch, by, summaryOf(patch), now()};
-  next.patch = textOf(scene::diffDocuments(before.gltf, after.gltf, parts));
+  next.patch = patchText(scene::diffDocuments(before.gltf, after.gltf, parts));
   next.appended = {before.buffers.size(), before.images.size(), appended(before.buffers, after.buffers),
                    appended(before.images, after.images)};
   next.edit =
-      state::Edit{revision, next.patch, textOf(scene::diffDocuments(after.gltf, before.gltf, parts)), next.appended};
+      state::Edit{revision, next.patch, patchText(scene::diffDocuments(after.gltf, before.gltf, parts)), next.appended};
   for (auto n = done_; n < edits_.size(); ++n) next.forgotten.push_back(edits_[n].revision);
   std::size_t count = done_ + 1, bytes = bytesOf(*next.edit);
   for (std::size_t n = 0; n < done_; ++n) bytes += bytesOf(edits_[n]);

@@ -13,7 +13,7 @@ namespace {
 /// Pixels of one image array: as for hemicubes, small where the processor draws and large with a card.
 constexpr std::size_t kSoftwarePixels = std::size_t{1} << 16U;
 constexpr std::size_t kCardPixels = std::size_t{1} << 22U;
-constexpr std::size_t kMaxLayers = 64;
+constexpr std::size_t kMaxParallelLayers = 64;
 
 }  // namespace
 
@@ -49,9 +49,10 @@ Result<void> ParallelRenderer::setScene(const GpuScene& scene) {
 
 std::size_t ParallelRenderer::capacity(std::uint32_t resolution) const {
   const auto pixels = std::size_t{resolution} * resolution;
-  if (drawing_ == Drawing::kByProcessor) return std::clamp<std::size_t>(kSoftwarePixels / pixels, 1, kMaxLayers);
+  if (drawing_ == Drawing::kByProcessor)
+    return std::clamp<std::size_t>(kSoftwarePixels / pixels, 1, kMaxParallelLayers);
   const auto triangles = std::max<std::size_t>(index_count_ / 3, 1);
-  return std::clamp<std::size_t>(std::min(kCardPixels / pixels, kCardTriangles / triangles), 1, kMaxLayers);
+  return std::clamp<std::size_t>(std::min(kCardPixels / pixels, kCardTriangles / triangles), 1, kMaxParallelLayers);
 }
 
 ParallelAxes ParallelRenderer::axes(const solver::ParallelView& view, std::uint32_t resolution) const {

@@ -20,7 +20,7 @@ constexpr double kGrazing = 2e-4;
 /// Boxes are larger by this (unit box) than what is in them: well above what rounding moves rays and positions.
 constexpr float kMargin = 1e-5F;
 /// And by this where it is places in them that count: rays start a little before these.
-constexpr auto kAround = static_cast<float>(4.0 * kBurialLift);
+constexpr auto kPlacesMargin = static_cast<float>(4.0 * kBurialLift);
 /// Rays that pass the boxes around all that changed are held against so many surfaces of it one by one.
 constexpr std::size_t kMostBoxes = 128;
 constexpr std::uint32_t kHemisphere = kFirstWayAlong - 1, kAlong = kBurialWays - kFirstWayAlong;
@@ -230,7 +230,7 @@ void FormerBurial::addParts(const PatchScene& patches, const std::vector<bool>& 
   const auto add = [&](std::span<const std::uint32_t> part_of, std::span<const ClosedSolids::Bounds> bounds) {
     const auto parts = partsWithMarked(patches, part_of, bounds.size(), changed);
     for (std::size_t i = 0; i < parts.size(); ++i)
-      if (parts[i]) boxes_.push_back({bounds[i].low - kAround, bounds[i].high + kAround});
+      if (parts[i]) boxes_.push_back({bounds[i].low - kPlacesMargin, bounds[i].high + kPlacesMargin});
   };
   add(solids.solid_of, solids.bounds);
   add(solids.hollow_of, solids.hollows);

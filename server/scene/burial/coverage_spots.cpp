@@ -125,9 +125,9 @@ constexpr float kCut = 0.25F;
 constexpr float kLift = 2e-5F, kInterior = 0.9F;
 /// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
 /// hole in the ceiling, whose shadow there falls on nothing that could make up for what pixels give it of the rim.
-constexpr float kBeside = 2.0F;
+constexpr float kHoverReach = 2.0F;
 /// What changed counts as so much larger (unit box): well above the rounding of boxes.
-constexpr float kAround = 1e-4F;
+constexpr float kChangeMargin = 1e-4F;
 /// Surfaces: fewer are not worth a thread.
 constexpr std::size_t kFewestAShare = 32;
 
@@ -191,7 +191,7 @@ class Gaps {
   void findChanged() {
     std::vector<bool> stayed(before_->surfaces.size(), false);
     const auto add = [&](const Surface& surface) {
-      changed_.push_back({surface.bounds_min - kAround, surface.bounds_max + kAround});
+      changed_.push_back({surface.bounds_min - kChangeMargin, surface.bounds_max + kChangeMargin});
     };
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
       if (surface_before_[s] == kNone) {
@@ -212,7 +212,7 @@ class Gaps {
     const auto &sides = patches_.surfaces[s].first_node, &former = before_->surfaces[surface_before_[s]].first_node;
     for (std::size_t side = 0; side < 2; ++side) {
       if ((sides[side] == kNone) != (former[side] == kNone)) return true;
-      if (sides[side] != kNone && isNearChanged(boxBefore(s, side == 0 ? 1.0F : -1.0F, level, at, 2.0F * kBeside)))
+      if (sides[side] != kNone && isNearChanged(boxBefore(s, side == 0 ? 1.0F : -1.0F, level, at, 2.0F * kHoverReach)))
         return true;
     }
     return false;
@@ -270,7 +270,7 @@ class Gaps {
       return tree_.touches(box, patches_.triangle_surface, s, looks_);
     };
     if (!touches(boxBefore(s, side, level, at, kInterior - 1.0F)) &&
-        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s, looks_))
+        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kHoverReach), patches_.triangle_surface, s, looks_))
       return;
     if (level == 0) {
       found.push_back({at, touches(boxBefore(s, side, 0, at, kInterior - 1.0F, kCut))});

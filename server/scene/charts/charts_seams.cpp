@@ -8,8 +8,8 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kSameNormal = 0.9999;  // 0.8 degrees, as coarse as normals of 8 bits are
-constexpr double kSamePlace = 1e-6;     // unit box; wider than rounding between instances, far below a texel
+constexpr double kSameSeamNormal = 0.9999;  // 0.8 degrees, as coarse as normals of 8 bits are
+constexpr double kSameSeamPlace = 1e-6;     // unit box; wider than rounding between instances, far below a texel
 
 struct BorderEdge {
   std::uint32_t low = 0, high = 0;  ///< welded ends
@@ -48,7 +48,7 @@ std::vector<BorderEdge> borderEdges(const FlatScene& flat, const std::vector<std
       ends.push_back(flat.points[triangle.points[e]]);
       ends.push_back(flat.points[triangle.points[next]]);
     }
-  const std::vector<std::uint32_t> ids = weldPoints(ends, kSamePlace);
+  const std::vector<std::uint32_t> ids = weldPoints(ends, kSameSeamPlace);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     edges[i].low = ids[2 * i];
     edges[i].high = ids[2 * i + 1];
@@ -81,8 +81,8 @@ void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbou
   };
   const auto looksSmooth = [&](const BorderEdge& x, const BorderEdge& y) {
     return normals.has(x.triangle) && normals.has(y.triangle) &&
-           glm::dot(normalAt(x, x.corner_low), normalAt(y, y.corner_low)) > kSameNormal &&
-           glm::dot(normalAt(x, x.corner_high), normalAt(y, y.corner_high)) > kSameNormal;
+           glm::dot(normalAt(x, x.corner_low), normalAt(y, y.corner_low)) > kSameSeamNormal &&
+           glm::dot(normalAt(x, x.corner_high), normalAt(y, y.corner_high)) > kSameSeamNormal;
   };
   for (std::size_t i = 0; i < edges.size();) {
     interruptionPoint();

@@ -22,9 +22,9 @@ using Triangle2 = std::array<glm::dvec2, 3>;
 
 /// A bilinear lookup reads texels whose middles are less than one texel away along either axis. At the very end of that
 /// their weight is nothing.
-constexpr double kReach = 0.999;
+constexpr double kLookupReach = 0.999;
 /// Islands that continue each other put the same place of the surface at a texel to within so many texels.
-constexpr double kSamePlace = 1.0;
+constexpr double kSamePlaceTexels = 1.0;
 
 /// Rows of triangles that are looked at, and pairs of these a row, in the mean: layouts of a million triangles have
 /// fewer. Slivers from end to end of a page would take gigabytes, and such a layout is of no use.
@@ -36,8 +36,8 @@ struct Span {
   std::uint32_t chart, triangle;  ///< triangle: of its chart
 };
 
-std::int32_t firstIndex(double low) { return static_cast<std::int32_t>(std::ceil(low - kReach - 0.5)); }
-std::int32_t lastIndex(double high) { return static_cast<std::int32_t>(std::floor(high + kReach - 0.5)); }
+std::int32_t firstIndex(double low) { return static_cast<std::int32_t>(std::ceil(low - kLookupReach - 0.5)); }
+std::int32_t lastIndex(double high) { return static_cast<std::int32_t>(std::floor(high + kLookupReach - 0.5)); }
 
 class Islands {
  public:
@@ -101,7 +101,7 @@ class Islands {
         for (auto& corner : t) corner *= resolution_;
         const auto [low, high] = std::minmax({t[0].y, t[1].y, t[2].y});
         for (auto row = firstIndex(low); row <= lastIndex(high); ++row) {
-          const auto extent = extentWithin(t, row + 0.5 - kReach, row + 0.5 + kReach);
+          const auto extent = extentWithin(t, row + 0.5 - kLookupReach, row + 0.5 + kLookupReach);
           if (extent.x > extent.y) continue;
           if (spans.size() > kMostSpans) return spans;
           spans.push_back({row, firstIndex(extent.x), lastIndex(extent.y), c, i});
@@ -142,7 +142,7 @@ class Islands {
     const auto& uv = cornersOf(b);
     const auto there = at(positionsOf(b), w);
     const auto expected = at(positionsOf(a), weightsAt(cornersOf(a), uv[0] * w[0] + uv[1] * w[1] + uv[2] * w[2]));
-    return glm::distance(there, expected) <= kSamePlace * texel_;
+    return glm::distance(there, expected) <= kSamePlaceTexels * texel_;
   }
 
   const FlatScene& flat_;

@@ -17,7 +17,7 @@ constexpr std::uint32_t kMostRegions = 256, kMostHidden = 1024;
 /// Pairs of pieces to be kept apart: each is asked of for each edge.
 constexpr std::size_t kMostApart = 2'000;
 /// Bilinear lookups read texels so far away, in texels.
-constexpr double kReach = 1.5;
+constexpr double kNarrowPiece = 1.5;
 
 /// Pieces joined to regions, step by step.
 class RegionFinder {
@@ -103,7 +103,7 @@ class RegionFinder {
   [[nodiscard]] const Part& partOf(std::uint32_t piece) const { return parts_[part_of_[piece]]; }
   [[nodiscard]] bool isHidden(std::uint32_t piece) const { return partOf(piece).hidden(); }
   [[nodiscard]] bool isNarrow(std::uint32_t piece) const {
-    return isHidden(piece) && partOf(piece).width() < kReach * scale_.texel;
+    return isHidden(piece) && partOf(piece).width() < kNarrowPiece * scale_.texel;
   }
   /// Of an edge, away from the piece on one of its sides.
   [[nodiscard]] glm::dvec2 outward(const PieceEdge& edge, std::size_t side) const {

@@ -12,8 +12,8 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr glm::dvec3 kRoom{6.0, 3.0, 6.0};  ///< metres
-constexpr std::uint32_t kBoxes = 240;       ///< twelve triangles each
+constexpr glm::dvec3 kRoomSize{6.0, 3.0, 6.0};  ///< metres
+constexpr std::uint32_t kBoxes = 240;           ///< twelve triangles each
 constexpr std::uint64_t kTexels = 8'000;
 
 /// In [0, 1): the golden ratio's multiples, and those of two others, spread evenly.
@@ -46,11 +46,11 @@ Scene furnishedRoom() {
   auto walls = box;
   for (std::size_t i = 0; i < walls.indices.size(); i += 3) std::swap(walls.indices[i + 1], walls.indices[i + 2]);
   scene.primitives = {walls, box};
-  scene.instances.push_back({.primitive = 0, .world = glm::scale(glm::dmat4(1.0), kRoom)});
+  scene.instances.push_back({.primitive = 0, .world = glm::scale(glm::dmat4(1.0), kRoomSize)});
   for (std::uint32_t i = 0; i < kBoxes; ++i) {
     const glm::dvec3 place(spread(i, std::numbers::phi) - 0.5, 0.6 * spread(i, std::numbers::sqrt2) - 0.5,
                            spread(i, std::numbers::sqrt3) - 0.5);
-    auto world = glm::translate(glm::dmat4(1.0), 0.9 * kRoom * place);
+    auto world = glm::translate(glm::dmat4(1.0), 0.9 * kRoomSize * place);
     world = glm::rotate(world, 2.0 * std::numbers::pi * spread(i, std::numbers::e), glm::dvec3(0.0, 1.0, 0.0));
     scene.instances.push_back({.primitive = 1, .world = glm::scale(world, glm::dvec3(0.3, 0.15, 0.2))});
   }

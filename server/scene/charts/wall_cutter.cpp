@@ -19,7 +19,7 @@ namespace radiosity::scene {
 namespace {
 
 /// Metres: however large texels are, rooms are larger, and their walls higher.
-constexpr double kRoom = 0.5;
+constexpr double kLeastRoom = 0.5;
 /// Of the least size: corners that are no farther apart are one.
 constexpr double kRounding = 1e-4, kMostRounding = 2e-2;
 /// Of the least size squared: a smaller face has no room for two regions.
@@ -275,7 +275,7 @@ class InstanceCutter {
 
 /// Lengths in the unit box.
 CutScale cutScale(const FlatScene& flat, double texel) {
-  const double least = std::min(texel, kRoom / flat.scale);
+  const double least = std::min(texel, kLeastRoom / flat.scale);
   return {texel, least, kRounding * least};
 }
 

@@ -21,7 +21,7 @@ constexpr double kGap = 0.02;
 /// Of the least size squared: a smaller facet is no wall.
 constexpr double kLeastWall = 0.5;
 /// Triangles near one face, and near all faces together. A building has fewer; what has more is cut nowhere else.
-constexpr std::size_t kMostNear = 20'000, kMostLooks = 4'000'000;
+constexpr std::size_t kMostNear = 20'000, kMostWallLooks = 4'000'000;
 
 }  // namespace
 
@@ -72,8 +72,8 @@ bool WallFinder::isDoubleSided(std::uint32_t triangle) const {
 }
 
 std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPlane& plane) {
-  gave_up_ = gave_up_ || looked_at_ > kMostLooks;
-  if (looked_at_ > kMostLooks) return {};
+  gave_up_ = gave_up_ || looked_at_ > kMostWallLooks;
+  if (looked_at_ > kMostWallLooks) return {};
   const auto margin = static_cast<float>(2.0 * touch_);
   std::vector<std::uint32_t> near;
   for (const auto t : facets_.facets[facet].triangles) {
@@ -86,8 +86,8 @@ std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPla
     const auto before = near.size();
     const bool all = tree_.collectNear(low - margin, high + margin, kMostNear, near);
     looked_at_ += near.size() - before;
-    gave_up_ = gave_up_ || !all || looked_at_ > kMostLooks;
-    if (!all || looked_at_ > kMostLooks) return {};
+    gave_up_ = gave_up_ || !all || looked_at_ > kMostWallLooks;
+    if (!all || looked_at_ > kMostWallLooks) return {};
   }
   std::ranges::sort(near);
   near.erase(std::unique(near.begin(), near.end()), near.end());

@@ -19,8 +19,8 @@ namespace radiosity::scene {
 namespace {
 
 /// The second is the first with a later codec, of which our library reads what the first has.
-constexpr std::array kMeshopt = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
-constexpr std::array<std::string_view, 3> kNames = {DracoPrimitives::kName, kMeshopt[0], kMeshopt[1]};
+constexpr std::array kMeshoptNames = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
+constexpr std::array<std::string_view, 3> kNames = {DracoPrimitives::kName, kMeshoptNames[0], kMeshoptNames[1]};
 constexpr std::array kLists = {"extensionsUsed", "extensionsRequired"};
 
 bool isOurs(const Json& name) {
@@ -41,7 +41,7 @@ bool anyHasOurs(const Json& owner, const char* list) {
 
 /// The compressed form of a view, and the extension's name; null: there is none.
 std::pair<const Json*, const char*> compressedForm(const Json& view) {
-  for (const auto* name : kMeshopt)
+  for (const auto* name : kMeshoptNames)
     if (const auto* extension = extensionOf(view, name)) return {extension, name};
   return {nullptr, nullptr};
 }
@@ -49,7 +49,7 @@ std::pair<const Json*, const char*> compressedForm(const Json& view) {
 void eraseMeshopt(Json& object) {
   const auto extensions = object.find("extensions");
   if (extensions == object.end()) return;
-  for (const auto* name : kMeshopt) extensions->erase(name);
+  for (const auto* name : kMeshoptNames) extensions->erase(name);
   if (extensions->empty()) object.erase(extensions);
 }
 
@@ -236,7 +236,7 @@ bool hasCompressedGeometry(const Json& gltf) {
 
 bool isFallbackBuffer(const Json& buffer) {
   const auto* extensions = memberOf(buffer, "extensions");
-  return extensions != nullptr && std::ranges::any_of(kMeshopt, [&](const char* name) {
+  return extensions != nullptr && std::ranges::any_of(kMeshoptNames, [&](const char* name) {
            const auto* extension = memberOf(*extensions, name);
            const auto* fallback = extension == nullptr ? nullptr : memberOf(*extension, "fallback");
            return fallback != nullptr && *fallback == true;

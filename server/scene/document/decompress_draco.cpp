@@ -12,7 +12,7 @@ namespace {
 constexpr int kUnsignedByte = 5121, kUnsignedShort = 5123, kUnsignedInt = 5125;
 constexpr int kTriangles = 4, kStrip = 5;
 constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
-constexpr std::size_t kAlignment = 4;  ///< of vertex data
+constexpr std::size_t kVertexAlignment = 4;  ///< of vertex data
 
 /// 0: a matrix, which no attribute of ours is.
 std::size_t componentsOf(const Json& accessor) {
@@ -71,7 +71,7 @@ Bytes padded(const Bytes& values, std::size_t element, std::size_t stride) {
 
 std::size_t strideOf(const Json& accessor) {
   const auto element = componentsOf(accessor) * componentBytes(accessor["componentType"].get<int>());
-  return (element + kAlignment - 1) / kAlignment * kAlignment;
+  return (element + kVertexAlignment - 1) / kVertexAlignment * kVertexAlignment;
 }
 
 void erase(Json& primitive, const char* extension) {

@@ -13,13 +13,13 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr const char* kLights = "KHR_lights_punctual";
-constexpr const char* kAreaLights = "EXT_lights_area";
-constexpr const char* kIesLights = "EXT_lights_ies";
+constexpr const char* kLightsName = "KHR_lights_punctual";
+constexpr const char* kAreaLightsName = "EXT_lights_area";
+constexpr const char* kIesLightsName = "EXT_lights_ies";
 constexpr const char* kVisibility = "KHR_node_visibility";
-constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
-constexpr const char* kDiffuseTransmission = "KHR_materials_diffuse_transmission";
-constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+constexpr const char* kSpecularGlossinessName = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* kDiffuseTransmissionName = "KHR_materials_diffuse_transmission";
+constexpr const char* kEmissiveStrengthName = "KHR_materials_emissive_strength";
 
 void setDefault(Json& object, const char* member, Json value) {
   if (!object.contains(member)) object[member] = std::move(value);
@@ -120,15 +120,15 @@ bool materialiseMaterial(Json& material) {
   setDefault(material, "extensions", Json::object());
   auto& extensions = material["extensions"];
   if (!extensions.is_object()) return false;
-  setDefault(extensions, kEmissiveStrength, Json::object());
-  auto& strength = extensions[kEmissiveStrength];
+  setDefault(extensions, kEmissiveStrengthName, Json::object());
+  auto& strength = extensions[kEmissiveStrengthName];
   if (strength.is_object()) setDefault(strength, "emissiveStrength", 1.0);
-  if (const auto found = extensions.find(kSpecularGlossiness); found != extensions.end() && found->is_object()) {
+  if (const auto found = extensions.find(kSpecularGlossinessName); found != extensions.end() && found->is_object()) {
     setDefault(*found, "diffuseFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
     setDefault(*found, "specularFactor", Json::array({1.0, 1.0, 1.0}));
     setDefault(*found, "glossinessFactor", 1.0);
   }
-  if (const auto found = extensions.find(kDiffuseTransmission); found != extensions.end() && found->is_object()) {
+  if (const auto found = extensions.find(kDiffuseTransmissionName); found != extensions.end() && found->is_object()) {
     setDefault(*found, "diffuseTransmissionFactor", 0.0);
     setDefault(*found, "diffuseTransmissionColorFactor", Json::array({1.0, 1.0, 1.0}));
   }
@@ -145,7 +145,7 @@ Json* lightsOf(Json& gltf, const char* name) {
 }
 
 void materialiseLights(Json& gltf) {
-  auto* lights = lightsOf(gltf, kLights);
+  auto* lights = lightsOf(gltf, kLightsName);
   if (lights == nullptr) return;
   for (auto& light : *lights) {
     if (!light.is_object()) continue;
@@ -158,7 +158,7 @@ void materialiseLights(Json& gltf) {
 }
 
 void materialiseAreaLights(Json& gltf) {
-  auto* lights = lightsOf(gltf, kAreaLights);
+  auto* lights = lightsOf(gltf, kAreaLightsName);
   if (lights == nullptr) return;
   for (auto& light : *lights) {
     if (!light.is_object()) continue;
@@ -174,8 +174,8 @@ void materialiseAreaLights(Json& gltf) {
 /// Of a node whose light has a web: colour and strength are its own.
 void materialiseIes(Json& node) {
   const auto extensions = node.find("extensions");
-  if (extensions == node.end() || !extensions->is_object() || !extensions->contains(kIesLights)) return;
-  auto& light = (*extensions)[kIesLights];
+  if (extensions == node.end() || !extensions->is_object() || !extensions->contains(kIesLightsName)) return;
+  auto& light = (*extensions)[kIesLightsName];
   if (!light.is_object()) return;
   setDefault(light, "multiplier", 1.0);
   setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
@@ -220,7 +220,7 @@ void materialiseDefaults(Json& gltf, const TouchedParts& parts) {
           [&](Json& material) { strength |= materialiseMaterial(material); });
   materialiseLights(gltf);
   materialiseAreaLights(gltf);
-  if (strength) markUsed(gltf, kEmissiveStrength);
+  if (strength) markUsed(gltf, kEmissiveStrengthName);
 }
 
 }  // namespace radiosity::scene

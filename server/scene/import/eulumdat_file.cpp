@@ -9,10 +9,10 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kLumensOff = 0.05;
+constexpr double kSumOff = 0.05;
 constexpr std::size_t kMostLampSets = 20;  // the format's own limit
 constexpr std::size_t kDirectRatios = 10;
-constexpr double kSameAngle = 1e-3;
+constexpr double kSameDegrees = 1e-3;
 
 /// Symmetry, by its number in the file.
 enum Symmetry : std::size_t { kNone, kAxis, kC0C180, kC90C270, kBoth };
@@ -29,7 +29,7 @@ class EulumdatFile {
     if (const auto done = readWeb(); !done) return tl::unexpected(done.error());
     // Of this format the luminaire's own share of the lamps' light is stated.
     const double stated = lumens_ * output_ratio_;
-    if (stated > 0.0 && std::abs(file_.web.lumens - stated) > kLumensOff * stated)
+    if (stated > 0.0 && std::abs(file_.web.lumens - stated) > kSumOff * stated)
       file_.warnings.push_back("its web sends " + lumensText(file_.web.lumens) +
                                ", but its lamps and output ratio say " + lumensText(stated));
     return std::move(file_);
@@ -147,7 +147,7 @@ class EulumdatFile {
   Result<void> complete(WebColumns& web) {
     const double first = web.columns.front().azimuth, last = web.columns.back().azimuth;
     const auto spans = [&](double from, double to) {
-      return std::abs(first - from) < kSameAngle && std::abs(last - to) < kSameAngle;
+      return std::abs(first - from) < kSameDegrees && std::abs(last - to) < kSameDegrees;
     };
     if (symmetry_ == kC0C180 && !spans(0, 180)) return bad("C planes must go from 0 to 180");
     if (symmetry_ == kC90C270 && !spans(-90, 90)) return bad("C planes must go from 270 to 90");

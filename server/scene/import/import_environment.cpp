@@ -16,7 +16,7 @@ namespace radiosity::scene {
 namespace {
 
 constexpr const char *kImageBased = "EXT_lights_image_based", *kMaps = "KHR_environment_map";
-constexpr double kPi = std::numbers::pi, kMostStrength = 1e9;
+constexpr double kPi = std::numbers::pi, kMostIntensity = 1e9;
 constexpr std::size_t kCoefficients = 9;
 /// Pixels of a face's picture at most.
 constexpr std::size_t kMostFacePixels = kMostCubeEdge * kMostCubeEdge;
@@ -48,7 +48,7 @@ class EnvironmentReader {
 
   Result<SkyImage> read() {
     if (!json_.is_object()) return context_.bad(pointer_, "must be an object");
-    const auto strength = number(json_, "intensity", 0.0, kMostStrength, 1.0);
+    const auto strength = number(json_, "intensity", 0.0, kMostIntensity, 1.0);
     if (!strength) return tl::unexpected(strength.error());
     strength_ = static_cast<float>(*strength);
     const auto turn = rotation();
@@ -159,7 +159,7 @@ class EnvironmentReader {
     if (!is_there) return context_.bad(pointer_ + "/cubemap", "is no cubemap");
     const auto& cube = (*cubes)[*index];
     const auto at = std::string("/extensions/") + kMaps + "/cubemaps/" + std::to_string(*index);
-    const auto strength = number(cube, "intensity", 0.0, kMostStrength, 1.0);
+    const auto strength = number(cube, "intensity", 0.0, kMostIntensity, 1.0);
     if (!strength) return tl::unexpected(strength.error());
     strength_ *= static_cast<float>(*strength);
     const auto* source = member(cube, "source");
@@ -177,7 +177,7 @@ class EnvironmentReader {
     for (std::size_t i = 0; good && i < kCoefficients; ++i) {
       good = json[i].is_array() && json[i].size() == 3;
       for (std::size_t c = 0; good && c < 3; ++c) {
-        good = json[i][c].is_number() && std::abs(json[i][c].get<double>()) <= kMostStrength;
+        good = json[i][c].is_number() && std::abs(json[i][c].get<double>()) <= kMostIntensity;
         if (good) sh[i][static_cast<int>(c)] = json[i][c].get<double>();
       }
     }

@@ -15,7 +15,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr const char* kMaterials = "materials";
+constexpr const char* kMaterialList = "materials";
 
 /// Names of all extensions used in a value; they nest at most 64 deep.
 void collectExtensions(const Json& value, std::set<std::string>& names) {
@@ -32,7 +32,7 @@ void collectExtensions(const Json& value, std::set<std::string>& names) {
 
 void warnUndeclared(ImportContext& context, std::set<std::string> names) {
   const auto& gltf = context.document.gltf;
-  if (const auto found = gltf.find(kMaterials); found != gltf.end()) collectExtensions(*found, names);
+  if (const auto found = gltf.find(kMaterialList); found != gltf.end()) collectExtensions(*found, names);
   const auto declared = gltf.value("extensionsUsed", Json::array());
   for (const auto& name : names) {
     if (std::find(declared.begin(), declared.end(), name) != declared.end()) continue;
@@ -188,7 +188,7 @@ void warnAboutElements(ImportContext& context, const std::vector<Trs>& elements,
 std::set<std::string> extensionsBesideMaterials(const Json& gltf) {
   std::set<std::string> names;
   for (const auto& [member, value] : gltf.items()) {
-    if (member == kMaterials || member == "extras") continue;
+    if (member == kMaterialList || member == "extras") continue;
     if (member == "extensions" && value.is_object()) {
       for (const auto& extension : value.items()) names.insert(extension.key());
     }

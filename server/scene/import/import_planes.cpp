@@ -16,8 +16,8 @@ namespace {
 
 constexpr const char* kMember = "radiosityPlane";
 /// Metres, of a side in the node's space and in the world.
-constexpr double kMostSide = 1e6, kLeastSide = 1e-6, kFarthest = 1e9;
-constexpr double kMostLux = 1e9;
+constexpr double kMostSide = 1e6, kLeastSide = 1e-6, kFarthestPlane = 1e9;
+constexpr double kMostAskedLux = 1e9;
 /// Of the cosine between the sides of a rectangle.
 constexpr double kSquare = 1e-3;
 
@@ -78,7 +78,7 @@ class PlaneReader {
     if (!(wide >= kLeastSide && deep >= kLeastSide && wide <= kMostSide && deep <= kMostSide))
       return bad(pointer_, "its sides must be from 1 um to 1000 km long as the node scales it");
     for (int c = 0; c < 3; ++c)
-      if (!(std::abs(made.corner[c]) <= kFarthest)) return bad(pointer_, "must lie within 1e9 m of the origin");
+      if (!(std::abs(made.corner[c]) <= kFarthestPlane)) return bad(pointer_, "must lie within 1e9 m of the origin");
     if (std::abs(glm::dot(made.across, made.down)) > kSquare * wide * deep)
       return bad(pointer_, "must stay a rectangle: the transforms above its node shear it");
     const auto normal = glm::normalize(glm::cross(made.down / deep, made.across / wide));
@@ -107,7 +107,7 @@ class PlaneReader {
     const auto *lux = memberOf(*json, "lux"), *uniformity = memberOf(*json, "uniformity");
     if (lux == nullptr && uniformity == nullptr) return bad(pointer, "must be an object with lux, uniformity or both");
     if (lux != nullptr) {
-      if (!isIn(*lux, kMostLux)) return bad(pointer + "/lux", "must be a number above 0, at most 1e9");
+      if (!isIn(*lux, kMostAskedLux)) return bad(pointer + "/lux", "must be a number above 0, at most 1e9");
       target.lux = lux->get<double>();
     }
     if (uniformity != nullptr) {

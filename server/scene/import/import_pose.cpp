@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t kMostTargets = 16;
 constexpr double kMostJointWeight = 1e6;
 
-bool isFinite(const glm::dvec3& p) {
+bool isInRange(const glm::dvec3& p) {
   constexpr double kMost = std::numeric_limits<float>::max();
   return std::abs(p.x) <= kMost && std::abs(p.y) <= kMost && std::abs(p.z) <= kMost;
 }
@@ -181,7 +181,7 @@ Result<bool> PoseImporter::apply(const Pose& pose, const tinygltf::Primitive& so
 Result<void> PoseImporter::checkReach(const std::vector<glm::dvec3>& before, const Primitive& primitive,
                                       const std::string& pointer) const {
   for (std::size_t i = 0; i < before.size(); ++i) {
-    if (isFinite(primitive.positions[i]) || !isFinite(before[i])) continue;
+    if (isInRange(primitive.positions[i]) || !isInRange(before[i])) continue;
     return context_.bad(pointer, "moves vertex " + std::to_string(i) + " of /meshes/" + std::to_string(primitive.mesh) +
                                      "/primitives/" + std::to_string(primitive.primitive) +
                                      " to where no number reaches");

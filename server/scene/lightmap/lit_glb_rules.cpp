@@ -12,7 +12,7 @@ constexpr std::size_t kMostSets = 16;
 constexpr std::size_t kUvBytes = 2 * sizeof(float);
 constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
 constexpr int kFloat = 5126;
-constexpr int kArrayBuffer = 34962;
+constexpr int kVertexBuffer = 34962;
 
 std::string nameOf(std::size_t set) { return "TEXCOORD_" + std::to_string(set); }
 
@@ -49,7 +49,7 @@ class Zeros {
                      {"byteOffset", bytes.size()},
                      {"byteLength", size},
                      {"byteStride", kUvBytes},
-                     {"target", kArrayBuffer}});
+                     {"target", kVertexBuffer}});
     bytes.resize(bytes.size() + size, 0);
     return {};
   }

@@ -19,7 +19,7 @@ constexpr std::uint32_t kPlaces = 32;
 /// Of what lies beyond all neighbours, or for leaves seen in part of the range of these, so much stays.
 constexpr float kBeyond = 0.5F, kBeyondInPart = 0.25F;
 /// Texels that a thread is worth.
-constexpr std::size_t kTexelsAThread = 4096;
+constexpr std::size_t kFittedAThread = 4096;
 
 /// How much a lookup on the visible part of a leaf takes, on average, of the texels beside it.
 struct Reach {
@@ -156,7 +156,7 @@ std::vector<glm::vec3> fitTexels(const PatchScene& patches, const LeafLight& lig
       SideFit(patches, surface, side, light).run(patches, out);
     }
   };
-  inTurns(patches.surfaces.size(), fit, texels / kTexelsAThread);
+  inTurns(patches.surfaces.size(), fit, texels / kFittedAThread);
   return fitted;
 }
 

@@ -10,8 +10,8 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180.0;
+using std::numbers::pi;
+constexpr double kDegree = pi / 180.0;
 /// Of pictures of the models, which vary slowly: 0.7 degrees.
 constexpr std::size_t kWidth = 512, kHeight = 256;
 /// Cosine of the zenith angle at the horizon, where gradations have none.
@@ -62,7 +62,7 @@ std::optional<int> offsetOf(std::string_view text) {
 
 /// Square of the mean distance of the sun by that of the day (Spencer 1971).
 double eccentricity(int day_of_year) {
-  const double angle = 2.0 * kPi * (day_of_year - 1) / 365.0;
+  const double angle = 2.0 * pi * (day_of_year - 1) / 365.0;
   return 1.00011 + 0.034221 * std::cos(angle) + 0.00128 * std::sin(angle) + 0.000719 * std::cos(2.0 * angle) +
          0.000077 * std::sin(2.0 * angle);
 }
@@ -229,7 +229,7 @@ SkyShape cieShape(int type) {
   const auto& gradation = kGradation[of[0]];
   const auto& indicatrix = kIndicatrix[of[1]];
   SkyShape shape{.a = gradation[0], .b = gradation[1], .c = indicatrix[0], .d = indicatrix[1], .e = indicatrix[2]};
-  shape.shift = std::exp(shape.d * kPi / 2.0);
+  shape.shift = std::exp(shape.d * pi / 2.0);
   return shape;
 }
 
@@ -255,7 +255,7 @@ DaylightPower clearPower(double turbidity, double altitude, int day_of_year) {
 }
 
 PerezSky perezSky(const DaylightPower& power, double altitude, int day_of_year) {
-  const double zenith = kPi / 2.0 - std::max(0.0, altitude), cubed = 1.041 * zenith * zenith * zenith;
+  const double zenith = pi / 2.0 - std::max(0.0, altitude), cubed = 1.041 * zenith * zenith * zenith;
   const double diffuse = std::max(power.diffuse, 1e-3);
   const double clearness = std::clamp(((diffuse + power.direct) / diffuse + cubed) / (1.0 + cubed), 1.0, 12.0);
   double brightness = std::clamp(diffuse * airMass(altitude) / (kSolarWatts * eccentricity(day_of_year)), 0.01, 0.6);
@@ -275,20 +275,20 @@ SkyImage daylightImage(const SkyShape& shape, const glm::dvec3& sun, double diff
   SkyImage image{kWidth, kHeight, std::vector<glm::vec3>(kWidth * kHeight, glm::vec3(static_cast<float>(ground_nits)))};
   double arrives = 0.0;  // for a luminance of the shape
   for (std::size_t y = 0; y < kHeight / 2; ++y) {
-    const double top = std::cos(kPi * static_cast<double>(y) / kHeight);
-    const double bottom = std::cos(kPi * static_cast<double>(y + 1) / kHeight);
+    const double top = std::cos(pi * static_cast<double>(y) / kHeight);
+    const double bottom = std::cos(pi * static_cast<double>(y + 1) / kHeight);
     const double height = 0.5 * (top + bottom), across = std::sqrt(1.0 - height * height);
     for (std::size_t x = 0; x < kWidth; ++x) {
-      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / kWidth - 1.0) * kPi;
+      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / kWidth - 1.0) * pi;
       const double nits = shape.at({across * std::cos(azimuth), height, across * std::sin(azimuth)}, sun);
       image.texels[y * kWidth + x] = glm::vec3(static_cast<float>(nits));
-      arrives += nits * 2.0 * kPi / kWidth * 0.5 * (top * top - bottom * bottom);
+      arrives += nits * 2.0 * pi / kWidth * 0.5 * (top * top - bottom * bottom);
     }
   }
   for (std::size_t i = 0; i < kWidth * kHeight / 2; ++i) {
     auto& texel = image.texels[i];  // a shape that is black everywhere tells nothing of where light comes from
     texel = arrives > 0.0 ? texel * static_cast<float>(diffuse_lux / arrives)
-                          : glm::vec3(static_cast<float>(diffuse_lux / kPi));
+                          : glm::vec3(static_cast<float>(diffuse_lux / pi));
   }
   return image;
 }

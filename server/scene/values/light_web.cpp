@@ -8,8 +8,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::size_t kHead = 2;
+constexpr double kWebDegree = std::numbers::pi / 180.0;
 
 /// Between two neighbours of a list: `part` of the way from the first.
 struct Between {
@@ -39,7 +38,8 @@ Between findAround(std::span<const float> azimuths, float at) {
 double polarIntegral(std::span<const float> polar, std::span<const float> candela) {
   double sum = 0.0;
   for (std::size_t i = 1; i < polar.size(); ++i) {
-    const double low = kDegree * static_cast<double>(polar[i - 1]), high = kDegree * static_cast<double>(polar[i]);
+    const double low = kWebDegree * static_cast<double>(polar[i - 1]),
+                 high = kWebDegree * static_cast<double>(polar[i]);
     const double width = high - low, whole = std::cos(low) - std::cos(high);
     const double rising = (std::sin(high) - std::sin(low) - width * std::cos(high)) / width;
     const auto first = static_cast<double>(candela[i - 1]), second = static_cast<double>(candela[i]);
@@ -57,7 +57,7 @@ double lumensOf(std::span<const float> polar, std::span<const float> azimuth, st
   double sum = 0.0;
   for (std::size_t a = 1; a < azimuth.size(); ++a) {
     const double here = column(a);
-    sum += 0.5 * (before + here) * kDegree * static_cast<double>(azimuth[a] - azimuth[a - 1]);
+    sum += 0.5 * (before + here) * kWebDegree * static_cast<double>(azimuth[a] - azimuth[a - 1]);
     before = here;
   }
   return sum;
@@ -83,21 +83,21 @@ LightWeb LightWeb::of(const std::vector<float>& polar_deg, const std::vector<flo
 }
 
 bool isWebTable(std::span<const float> table) {
-  if (table.size() < kHead) return false;
+  if (table.size() < kWebHead) return false;
   const float polar = table[0], azimuth = table[1];
   if (!(polar >= 2.0F && azimuth >= 1.0F && polar <= static_cast<float>(kMostWebCandela) &&
         azimuth <= static_cast<float>(kMostWebCandela)))
     return false;
   const auto rows = static_cast<std::size_t>(polar), columns = static_cast<std::size_t>(azimuth);
-  return rows * columns <= kMostWebCandela && table.size() == kHead + rows + columns + rows * columns;
+  return rows * columns <= kMostWebCandela && table.size() == kWebHead + rows + columns + rows * columns;
 }
 
 float webCandela(std::span<const float> table, float polar_deg, float azimuth_deg) {
   const auto rows = static_cast<std::size_t>(table[0]), columns = static_cast<std::size_t>(table[1]);
-  const auto p = find(table.subspan(kHead, rows), polar_deg);
-  const auto a = findAround(table.subspan(kHead + rows, columns), azimuth_deg);
+  const auto p = find(table.subspan(kWebHead, rows), polar_deg);
+  const auto a = findAround(table.subspan(kWebHead + rows, columns), azimuth_deg);
   if (!p.inside || !a.inside) return 0.0F;
-  const auto candela = table.subspan(kHead + rows + columns);
+  const auto candela = table.subspan(kWebHead + rows + columns);
   const auto along = [&](std::size_t column) {
     const float low = candela[column * rows + p.first], high = candela[column * rows + p.second];
     return low + p.part * (high - low);

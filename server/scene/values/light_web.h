@@ -12,6 +12,8 @@ namespace radiosity::scene {
 
 /// More angles than this, polar times azimuth, are refused: half a degree all around is less.
 inline constexpr std::size_t kMostWebCandela = std::size_t{1} << 18U;
+/// Numbers of a table before the angles: how many of either there are.
+inline constexpr std::size_t kWebHead = 2;
 
 /// A table: the number of polar angles (2 at least), that of azimuths (1 at least), the polar angles, the azimuths
 /// (both degrees, ascending), then the candela, azimuth by azimuth. One azimuth alone stands for all.
@@ -21,7 +23,7 @@ struct LightWeb {
   std::uint64_t key = 0;  ///< of the table
 
   [[nodiscard]] std::span<const float> candela() const {
-    return std::span(table).subspan(2 + static_cast<std::size_t>(table[0]) + static_cast<std::size_t>(table[1]));
+    return std::span(table).subspan(kWebHead + static_cast<std::size_t>(table[0]) + static_cast<std::size_t>(table[1]));
   }
   /// All finite, and as long as the list says. O(n).
   [[nodiscard]] static LightWeb of(const std::vector<float>& polar_deg, const std::vector<float>& azimuth_deg,

@@ -11,7 +11,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 /// As for surfaces, of which those shoot that are so many times as bright as the mean.
 constexpr double kBright = 8.0;
 /// The mean of what is no brighter than that is found in so many steps at most, or once it changes by less than this.
@@ -28,13 +28,13 @@ double luminance(const glm::dvec3& colour) { return 0.2126 * colour.x + 0.7152 *
 
 /// Height of the upper edge of a row.
 double heightOf(std::size_t row, std::size_t rows) {
-  return std::cos(kPi * static_cast<double>(row) / static_cast<double>(rows));
+  return std::cos(pi * static_cast<double>(row) / static_cast<double>(rows));
 }
 
 /// Calls visit(texel number, solid angle) for each texel.
 template <typename Visit>
 void forEachTexel(const SkyImage& image, const Visit& visit) {
-  const double column = 2.0 * kPi / static_cast<double>(image.width);
+  const double column = 2.0 * pi / static_cast<double>(image.width);
   for (std::size_t y = 0; y < image.height; ++y) {
     const double solid_angle = column * (heightOf(y, image.height) - heightOf(y + 1, image.height));
     for (std::size_t x = 0; x < image.width; ++x) visit(y * image.width + x, solid_angle);
@@ -60,7 +60,7 @@ double brightFrom(const SkyImage& image) {
     forEachTexel(image, [&](std::size_t i, double solid_angle) {
       sum += solid_angle * std::min(from, static_cast<double>(of_texel[i]));
     });
-    const double next = kBright * sum / (4.0 * kPi);
+    const double next = kBright * sum / (4.0 * pi);
     if (!(next < (1.0 - kSettled) * from)) break;
     from = next;
   }
@@ -212,7 +212,7 @@ void SkyPicture::sumUp(const SkyImage& rest) {
 
 /// Integral over all that is above the height, from the first column up to there.
 glm::dvec3 SkyPicture::sumAt(double column, double height) const {
-  const double row = std::acos(std::clamp(height, -1.0, 1.0)) / kPi * static_cast<double>(height_);
+  const double row = std::acos(std::clamp(height, -1.0, 1.0)) / pi * static_cast<double>(height_);
   const auto x = std::min(width_ - 1, static_cast<std::size_t>(column));
   const auto y = std::min(height_ - 1, static_cast<std::size_t>(row));
   const double top = heightOf(y, height_), bottom = heightOf(y + 1, height_);
@@ -223,7 +223,7 @@ glm::dvec3 SkyPicture::sumAt(double column, double height) const {
 
 glm::dvec3 SkyPicture::restOver(double azimuth, double width, double height, double extent) const {
   const auto columns = static_cast<double>(width_);
-  const double first = (azimuth / (2.0 * kPi) + 0.5) * columns, count = width / (2.0 * kPi) * columns;
+  const double first = (azimuth / (2.0 * pi) + 0.5) * columns, count = width / (2.0 * pi) * columns;
   const double turned = first - std::floor(first / columns) * columns;  // in [0, columns)
   const auto upTo = [&](double column) {                                // over all turns
     const double turns = std::floor(column / columns);
@@ -236,8 +236,8 @@ glm::dvec3 SkyPicture::restOver(double azimuth, double width, double height, dou
 
 glm::vec3 SkyPicture::radiance(const glm::dvec3& direction) const {
   const auto width = static_cast<double>(image_.width), height = static_cast<double>(image_.height);
-  const double column = (std::atan2(direction.z, direction.x) / (2.0 * kPi) + 0.5) * width - 0.5;
-  const double row = std::clamp(std::acos(std::clamp(direction.y, -1.0, 1.0)) / kPi * height - 0.5, 0.0, height - 1.0);
+  const double column = (std::atan2(direction.z, direction.x) / (2.0 * pi) + 0.5) * width - 0.5;
+  const double row = std::clamp(std::acos(std::clamp(direction.y, -1.0, 1.0)) / pi * height - 0.5, 0.0, height - 1.0);
   const double left = std::floor(column), top = std::floor(row);
   const auto texel = [&](double x, double y) {
     const auto at = static_cast<std::size_t>(std::fmod(x + width, width));

@@ -11,8 +11,8 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr std::size_t kHead = 4, kOfRectangle = 5;
+using std::numbers::pi;
+constexpr std::size_t kSkyHead = 4, kOfRectangle = 5;
 /// Rectangles are cut until what their light may be off by, times how far, is less than this part of all light (rad):
 /// so little that the sky around a sun, a tenth of all light where that is hidden, is known to a degree or two.
 constexpr double kSmooth = 1e-7;
@@ -33,7 +33,7 @@ class Sums {
         height_(grid.height),
         light_((width_ + 1) * (height_ + 1), 0.0),
         square_((width_ + 1) * (height_ + 1), 0.0) {
-    const double column = 2.0 * kPi / static_cast<double>(width_);
+    const double column = 2.0 * pi / static_cast<double>(width_);
     for (std::size_t y = 0; y < height_; ++y) {
       const double solid_angle = column * (heightOf(y) - heightOf(y + 1));
       double light = 0.0, square = 0.0;
@@ -49,10 +49,10 @@ class Sums {
 
   /// Of the upper edge of a row.
   [[nodiscard]] double heightOf(std::size_t row) const {
-    return std::cos(kPi * static_cast<double>(row) / static_cast<double>(height_));
+    return std::cos(pi * static_cast<double>(row) / static_cast<double>(height_));
   }
   [[nodiscard]] double azimuthOf(std::size_t column) const {
-    return (2.0 * static_cast<double>(column) / static_cast<double>(width_) - 1.0) * kPi;
+    return (2.0 * static_cast<double>(column) / static_cast<double>(width_) - 1.0) * pi;
   }
 
   [[nodiscard]] Rectangle rectangle(std::size_t x0, std::size_t x1, std::size_t y0, std::size_t y1) const {
@@ -65,11 +65,11 @@ class Sums {
   }
   /// Across and down, radians.
   [[nodiscard]] double widthOf(const Rectangle& of) const {
-    const double middle = kPi * static_cast<double>(of.y0 + of.y1) / (2.0 * static_cast<double>(height_));
+    const double middle = pi * static_cast<double>(of.y0 + of.y1) / (2.0 * static_cast<double>(height_));
     return std::sin(middle) * (azimuthOf(of.x1) - azimuthOf(of.x0));
   }
   [[nodiscard]] double fallOf(const Rectangle& of) const {
-    return kPi * static_cast<double>(of.y1 - of.y0) / static_cast<double>(height_);
+    return pi * static_cast<double>(of.y1 - of.y0) / static_cast<double>(height_);
   }
 
  private:
@@ -136,7 +136,7 @@ std::vector<float> skyTable(const SkyGrid& grid) {
   const auto count = rectangles.size();
   double all = 0.0, sum = 0.0;
   for (const auto& of : rectangles) all += of.light;
-  std::vector<float> table(kHead + kOfRectangle * count);
+  std::vector<float> table(kSkyHead + kOfRectangle * count);
   table[0] = static_cast<float>(count);
   glm::dvec3 mean(0.0);
   for (std::size_t i = 0; i < count; ++i) {
@@ -146,18 +146,19 @@ std::vector<float> skyTable(const SkyGrid& grid) {
     const double height = sums.heightOf(of.y1), extent = sums.heightOf(of.y0) - height;
     mean += of.light / all * directionAt(azimuth + 0.5 * width, height + 0.5 * extent);
     const std::array<double, kOfRectangle> numbers{i + 1 < count ? sum / all : 1.0, azimuth, width, height, extent};
-    for (std::size_t k = 0; k < kOfRectangle; ++k) table[kHead + k * count + i] = static_cast<float>(numbers[k]);
+    for (std::size_t k = 0; k < kOfRectangle; ++k) table[kSkyHead + k * count + i] = static_cast<float>(numbers[k]);
   }
   for (int c = 0; c < 3; ++c) table[1 + static_cast<std::size_t>(c)] = static_cast<float>(mean[c]);
   return table;
 }
 
 bool isSkyTable(std::span<const float> table) {
-  if (table.size() < kHead + kOfRectangle || !(table[0] >= 1.0F && table[0] <= static_cast<float>(kMostSkyRectangles)))
+  if (table.size() < kSkyHead + kOfRectangle ||
+      !(table[0] >= 1.0F && table[0] <= static_cast<float>(kMostSkyRectangles)))
     return false;
   const auto count = static_cast<std::size_t>(table[0]);
-  if (table.size() != kHead + kOfRectangle * count) return false;
-  const auto sums = table.subspan(kHead, count);
+  if (table.size() != kSkyHead + kOfRectangle * count) return false;
+  const auto sums = table.subspan(kSkyHead, count);
   return sums.front() >= 0.0F && sums.back() == 1.0F && std::ranges::is_sorted(sums);
 }
 
@@ -165,12 +166,12 @@ glm::dvec3 meanSkyDirection(std::span<const float> table) { return {table[1], ta
 
 glm::dvec3 skyDirection(std::span<const float> table, const glm::dvec2& at) {
   const auto count = static_cast<std::size_t>(table[0]);
-  const auto sums = table.subspan(kHead, count);
+  const auto sums = table.subspan(kSkyHead, count);
   const auto above = std::upper_bound(sums.begin(), sums.end() - 1, static_cast<float>(at.x));
   const auto i = static_cast<std::size_t>(above - sums.begin());
   const double low = i > 0 ? static_cast<double>(sums[i - 1]) : 0.0, high = static_cast<double>(sums[i]);
   const double within = high > low ? std::clamp((at.x - low) / (high - low), 0.0, 1.0) : 0.5;
-  const auto number = [&](std::size_t k) { return static_cast<double>(table[kHead + k * count + i]); };
+  const auto number = [&](std::size_t k) { return static_cast<double>(table[kSkyHead + k * count + i]); };
   return directionAt(number(1) + within * number(2), std::clamp(number(3) + at.y * number(4), -1.0, 1.0));
 }
 

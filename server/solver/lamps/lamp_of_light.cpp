@@ -10,23 +10,23 @@ namespace radiosity::solver {
 namespace {
 
 using scene::LightKind;
-using Kind = LampShape::Kind;
+using ShapeKind = LampShape::Kind;
 
 /// A smaller ball (unit box) is a point to all that may see it, and its square would be no number.
 constexpr float kLeastBall = 1e-6F;
 
-Kind kindOf(LightKind kind) {
+ShapeKind kindOf(LightKind kind) {
   switch (kind) {
     case LightKind::kRectangle:
-      return Kind::kRectangle;
+      return ShapeKind::kRectangle;
     case LightKind::kDisc:
-      return Kind::kDisc;
+      return ShapeKind::kDisc;
     case LightKind::kWeb:
-      return Kind::kWeb;
+      return ShapeKind::kWeb;
     case LightKind::kSpot:
-      return Kind::kSpotDisc;
+      return ShapeKind::kSpotDisc;
     default:
-      return Kind::kBall;
+      return ShapeKind::kBall;
   }
 }
 
@@ -53,14 +53,14 @@ LampShape lampShape(const scene::PatchScene& patches, const scene::PunctualLight
   LampShape shape;
   shape.kind = kindOf(light.kind);
   shape.centre = glm::vec3((light.position - patches.centre) / patches.scale);
-  if (shape.kind != Kind::kBall) {  // which has no axis: a turn of its node is no edit
+  if (shape.kind != ShapeKind::kBall) {  // which has no axis: a turn of its node is no edit
     shape.axis = glm::normalize(glm::vec3(light.direction));
     shape.across = acrossOf(light);
   }
-  if (shape.kind != Kind::kWeb) shape.half = glm::vec2(light.half / patches.scale);
-  if (shape.kind != Kind::kRectangle) shape.half.y = 0.0F;
-  if (shape.kind == Kind::kBall) shape.half.x = std::max(shape.half.x, kLeastBall);
-  if (shape.kind == Kind::kSpotDisc) {
+  if (shape.kind != ShapeKind::kWeb) shape.half = glm::vec2(light.half / patches.scale);
+  if (shape.kind != ShapeKind::kRectangle) shape.half.y = 0.0F;
+  if (shape.kind == ShapeKind::kBall) shape.half.x = std::max(shape.half.x, kLeastBall);
+  if (shape.kind == ShapeKind::kSpotDisc) {
     shape.cone_scale = cone.scale;
     shape.cone_offset = cone.offset;
   }

@@ -18,7 +18,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 constexpr std::uint32_t kMostPointPixels = 512, kMostParallelPixels = 2048;
 
@@ -50,14 +50,14 @@ std::array<double, 3> channels(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 glm::vec3 perpendicular(const glm::vec3& axis, double turns) {
   const glm::vec3 helper = std::abs(axis.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
   const glm::vec3 a = glm::normalize(glm::cross(helper, axis));
-  const double angle = 2.0 * kPi * turns;
+  const double angle = 2.0 * pi * turns;
   return glm::normalize(a * static_cast<float>(std::cos(angle)) +
                         glm::cross(axis, a) * static_cast<float>(std::sin(angle)));
 }
 
 /// Uniform over the sphere (u in [0, 1)), or over the upper half of it about +Y (u in [0.5, 1)).
 glm::vec3 onSphere(double u, double v) {
-  const double y = 2.0 * u - 1.0, radius = std::sqrt(std::max(0.0, 1.0 - y * y)), angle = 2.0 * kPi * v;
+  const double y = 2.0 * u - 1.0, radius = std::sqrt(std::max(0.0, 1.0 - y * y)), angle = 2.0 * pi * v;
   return {static_cast<float>(radius * std::cos(angle)), static_cast<float>(y),
           static_cast<float>(radius * std::sin(angle))};
 }
@@ -74,10 +74,10 @@ ReceiverPoints receiverPoints(std::uint32_t index, std::uint64_t key) {
 
 /// Integral of clamp(cos scale + offset, 0, 1)^2 over the half space around the axis, sr.
 double coneSolidAngle(double scale, double offset) {
-  if (scale <= 0.0) return 2.0 * kPi;
+  if (scale <= 0.0) return 2.0 * pi;
   const double outer = std::clamp(-offset / scale, 0.0, 1.0), inner = std::clamp((1.0 - offset) / scale, outer, 1.0);
   const auto cubed = [&](double c) { return std::pow(std::clamp(c * scale + offset, 0.0, 1.0), 3.0); };
-  return 2.0 * kPi * ((cubed(inner) - cubed(outer)) / (3.0 * scale) + 1.0 - inner);
+  return 2.0 * pi * ((cubed(inner) - cubed(outer)) / (3.0 * scale) + 1.0 - inner);
 }
 
 ParallelView parallelView(const glm::vec3& direction, double turn, double shift, std::uint64_t key) {
@@ -177,7 +177,7 @@ PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patche
   Source source;
   const glm::dvec3 position = (light.position - patches.centre) / patches.scale;
   source.intensity = glm::dvec3(light.intensity) / (patches.scale * patches.scale);
-  source.flux_per_intensity = 4.0 * kPi;
+  source.flux_per_intensity = 4.0 * pi;
   if (light.kind == scene::LightKind::kSpot) {
     source.kind = Source::Kind::kSpot;
     source.direction = glm::normalize(glm::vec3(light.direction));
@@ -263,7 +263,7 @@ PunctualLights::Source PunctualLights::makeSky(const glm::vec3& radiance, float 
   source.intensity = glm::dvec3(radiance);
   const glm::dvec3 size(box_[1] - box_[0]);
   // The sum of pi (1 + cos) / 2 times area over the faces of the box.
-  source.flux_per_intensity = kPi * (size.x * size.y + size.y * size.z + size.z * size.x);
+  source.flux_per_intensity = pi * (size.x * size.y + size.y * size.z + size.z * size.x);
   return source;
 }
 
@@ -452,7 +452,7 @@ void PunctualLights::addSky(const Task& task, ShotBatch& batch) const {
     shot.first_view = begin + first;
     shot.view_count = std::min(settings_.views_a_shot, count - first);
     shot.receivers = receiverPoints(task.sequence * count + first, mixKeys(key, 1));
-    shot.irradiance = channels(weighed * (2.0 * kPi / count));
+    shot.irradiance = channels(weighed * (2.0 * pi / count));
     double seen = 0.0;
     for (std::uint32_t i = 0; i < shot.view_count; ++i) {
       seen += boxSilhouette(box_, batch.views[shot.first_view + i].direction);

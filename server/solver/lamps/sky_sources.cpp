@@ -12,7 +12,7 @@ namespace {
 
 using Source = PunctualLights::Source;
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 /// So many directions of a lamp, drawn evenly, tell how large the scene is to it.
 constexpr int kSilhouettes = 32;
 
@@ -82,7 +82,7 @@ std::vector<Source> pictureSources(const scene::Sky& sky, const std::array<glm::
 SkyLight::SkyLight(std::span<const Source> sources) {
   for (const auto& source : sources) {
     if (source.kind != Source::Kind::kSky) continue;
-    const auto light = kPi * source.intensity;
+    const auto light = pi * source.intensity;
     if (!source.isPicture()) {
       hemispheres[source.direction.y > 0.0F ? 0 : 1] += light;
       continue;

@@ -13,13 +13,13 @@ namespace {
 /// Nearer to a lamp's plane than this (unit box) is on it.
 constexpr double kOnLamp = 1e-6;
 /// Light from directions without an end comes from there.
-constexpr double kFar = 4.0;
+constexpr double kEndless = 4.0;
 
-using Kind = PunctualLights::Source::Kind;
+using SourceKind = PunctualLights::Source::Kind;
 
 /// To one without a size.
 glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place) {
-  if (source.kind == Kind::kDirectional) return kFar * glm::dvec3(source.direction);
+  if (source.kind == SourceKind::kDirectional) return kEndless * glm::dvec3(source.direction);
   return glm::dvec3(source.position) - place.position;
 }
 
@@ -31,7 +31,7 @@ double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
 }
 
 SourceLook lookAt(const PunctualLights::Source& source, const LeafRays::Place& place, const glm::dvec2& at) {
-  if (source.kind == Kind::kLamp) {
+  if (source.kind == SourceKind::kLamp) {
     const auto point = lampPoint(source.lamp(), place.position, place.normal, at);
     return {point.position - place.position, point.brings};
   }
@@ -39,13 +39,13 @@ SourceLook lookAt(const PunctualLights::Source& source, const LeafRays::Place& p
 }
 
 double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place) {
-  if (source.kind == Kind::kSky) return 0.0;
-  if (source.kind == Kind::kLamp) return wholeIrradiance(source.lamp(), place.position, place.normal);
+  if (source.kind == SourceKind::kSky) return 0.0;
+  if (source.kind == SourceKind::kLamp) return wholeIrradiance(source.lamp(), place.position, place.normal);
   const glm::dvec3 way = wayTo(source, place), axis(source.direction);
   const double distance = glm::length(way), cosine = distance > 0.0 ? glm::dot(place.normal, way) / distance : 0.0;
-  if (cosine <= 0.0 || source.kind == Kind::kDirectional) return std::max(0.0, cosine);
+  if (cosine <= 0.0 || source.kind == SourceKind::kDirectional) return std::max(0.0, cosine);
   double strength = 1.0;
-  if (source.kind == Kind::kSpot) {
+  if (source.kind == SourceKind::kSpot) {
     const double fade = std::clamp(-glm::dot(axis, way) / distance * static_cast<double>(source.cone_scale) +
                                        static_cast<double>(source.cone_offset),
                                    0.0, 1.0);

@@ -8,7 +8,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 glm::dvec3 perpendicularTo(const glm::dvec3& axis) {
   const glm::dvec3 helper = std::abs(axis.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
@@ -55,14 +55,14 @@ double discFormFactor(const glm::dvec3& point, const glm::dvec3& normal, const g
   // Above the horizon: steep cos(phi - middle) > level.
   const double steep = radius * std::hypot(local.x, local.y), level = local.x * offset + local.z * height;
   if (steep <= level) return 0.0;
-  if (-steep >= level) return std::max(0.0, -rim.integral(local, -kPi, kPi) / (2.0 * kPi));
+  if (-steep >= level) return std::max(0.0, -rim.integral(local, -pi, pi) / (2.0 * pi));
   const double middle = std::atan2(local.y, local.x), half = std::acos(level / steep);
   const double begin = middle - half, end = middle + half;
   const auto first = rim.at(end), second = rim.at(begin);
   const auto turn = glm::cross(first, second);
   const double angle = std::atan2(glm::length(turn), glm::dot(first, second));
   const double chord = glm::dot(turn, local) < 0.0 ? -angle : angle;
-  return std::max(0.0, -(rim.integral(local, begin, end) + chord) / (2.0 * kPi));
+  return std::max(0.0, -(rim.integral(local, begin, end) + chord) / (2.0 * pi));
 }
 
 double ballFormFactor(const glm::dvec3& point, const glm::dvec3& normal, const glm::dvec3& centre, double radius) {
@@ -76,7 +76,7 @@ double ballFormFactor(const glm::dvec3& point, const glm::dvec3& normal, const g
   const double across = std::sqrt(1.0 - cosine * cosine), x = std::sqrt(std::max(0.0, 1.0 / square - 1.0));
   const double y = std::clamp(-x * cosine / across, -1.0, 1.0), rest = across * std::sqrt(1.0 - y * y);
   const double whole = (cosine * std::acos(y) - x * rest) * square + std::atan2(rest, x);
-  return std::max(0.0, whole / kPi);
+  return std::max(0.0, whole / pi);
 }
 
 }  // namespace radiosity::solver

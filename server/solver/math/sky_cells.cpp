@@ -8,8 +8,8 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kRowAngle = kPi / 2.0 / SkyCells::kRows;
+using std::numbers::pi;
+constexpr double kRowAngle = pi / 2.0 / SkyCells::kRows;
 
 struct Row {
   std::uint32_t first = 0, count = 0;
@@ -20,7 +20,7 @@ std::array<Row, SkyCells::kRows> makeRows() {
   std::array<Row, SkyCells::kRows> rows;
   std::uint32_t first = 0;
   for (std::uint32_t r = 0; r < rows.size(); ++r) {
-    const double around = 2.0 * kPi * std::cos((r + 0.5) * kRowAngle);
+    const double around = 2.0 * pi * std::cos((r + 0.5) * kRowAngle);
     rows[r] = {first, std::max(1U, static_cast<std::uint32_t>(std::lround(around / kRowAngle)))};
     first += rows[r].count;
   }
@@ -39,7 +39,7 @@ const std::array<Row, SkyCells::kRows>& rows() {
 std::uint32_t SkyCells::of(const glm::dvec3& direction) {
   const double altitude = std::asin(std::min(1.0, std::abs(direction.y)));
   const auto& row = rows()[std::min(kRows - 1, static_cast<std::uint32_t>(altitude / kRowAngle))];
-  const double turn = std::atan2(direction.z, direction.x) / (2.0 * kPi) + 0.5;
+  const double turn = std::atan2(direction.z, direction.x) / (2.0 * pi) + 0.5;
   const auto column = std::min(row.count - 1, static_cast<std::uint32_t>(turn * row.count));
   return (direction.y >= 0.0 ? 0 : kHalf) + row.first + column;
 }
@@ -50,8 +50,8 @@ SkyCells::Extent SkyCells::extentOf(std::uint32_t cell) {
   const auto r = static_cast<std::uint32_t>(after - rows().begin() - 1);
   const double low = std::sin(r * kRowAngle), high = r + 1 < kRows ? std::sin((r + 1) * kRowAngle) : 1.0;
   const auto& row = rows()[r];
-  const double width = 2.0 * kPi / row.count;
-  return {(in_half - row.first) * width - kPi, width, isAbove(cell) ? low : -high, high - low};
+  const double width = 2.0 * pi / row.count;
+  return {(in_half - row.first) * width - pi, width, isAbove(cell) ? low : -high, high - low};
 }
 
 glm::dvec3 SkyCells::directionOf(std::uint32_t cell) {

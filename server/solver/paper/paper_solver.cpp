@@ -23,8 +23,6 @@ constexpr double kNothingArrived = 2.0;
 /// Pixels of a hemicube's top face: of the weakest shots and of the strongest. The paper names none.
 constexpr std::uint32_t kLeastResolution = 32, kMostResolution = 256;
 
-double channels(const glm::dvec3& value) { return std::abs(value.x) + std::abs(value.y) + std::abs(value.z); }
-
 glm::dvec3 emittedBy(const ShotBatch& batch) {
   glm::dvec3 sum(0.0);
   for (const auto& shot : batch.point_lights) sum += glm::dvec3(shot.emitted[0], shot.emitted[1], shot.emitted[2]);
@@ -64,7 +62,7 @@ void PaperSolver::startAnew() {
           static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dvec3(trees_.emission(side, leaf));
   shown_.reset();
   received_ = reflected_ = 0.0;
-  share_ = (channels(emitted_) + punctual_.owed(1)) / kShotsOfAll;
+  share_ = (channelSum(emitted_) + punctual_.owed(1)) / kShotsOfAll;
   shot_level_.assign(patches_->nodeCount(), kNeverShot);
   shots_ = 0;
   settleError();

@@ -7,8 +7,6 @@
 namespace radiosity::solver {
 namespace {
 
-double channels(const glm::dvec3& value) { return std::abs(value.x) + std::abs(value.y) + std::abs(value.z); }
-
 bool isNone(const Flux3& flux) { return flux[0] == 0 && flux[1] == 0 && flux[2] == 0; }
 
 void add(Flux3& sum, const Flux3& flux) {
@@ -77,7 +75,7 @@ void PatchTrees::receive(const FluxAccumulators& shot) {
         }
         const auto light = scaled(flux, flux_scale_);
         unpushed_[node] += light;
-        arrived += channels(light);
+        arrived += channelSum(light);
       }
     }
     if (arrived <= 0.0) continue;
@@ -85,7 +83,7 @@ void PatchTrees::receive(const FluxAccumulators& shot) {
     side.unshot_power += arrived * static_cast<double>(side.mean_reflectance);
     if (letsThrough(side)) {
       auto& other = sides_[side.other];
-      other.unshot_power += arrived * channels(transmittance(other, other.node_count - 1)) / 3.0;
+      other.unshot_power += arrived * channelSum(transmittance(other, other.node_count - 1)) / 3.0;
     }
   }
   add(escaped_, shot.escaped);
@@ -171,7 +169,7 @@ void PatchTrees::push(const Side& side) {
 }
 
 double PatchTrees::leafPower(std::uint32_t node) const {
-  return channels(unshot_[node]) * static_cast<double>(patches_->node_area[node]);
+  return channelSum(unshot_[node]) * static_cast<double>(patches_->node_area[node]);
 }
 
 void PatchTrees::pull(Side& side) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -14,6 +15,11 @@
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
+
+/// Of all channels, whatever their signs.
+[[nodiscard]] inline double channelSum(const glm::dvec3& value) {
+  return std::abs(value.x) + std::abs(value.y) + std::abs(value.z);
+}
 
 class PatchTrees {
  public:

@@ -13,7 +13,7 @@ namespace {
 
 /// Normals and places of one plane differ by no more, beside the rounding of corners: an image at the far end of the
 /// unit box is off by as much.
-constexpr double kSame = 2e-6;
+constexpr double kSamePlane = 2e-6;
 
 /// Of the area of all surfaces, mirrors in one plane reflect as much as this at least: what comes from less is not
 /// worth looking for from everywhere. A seat of glass in a room is as much, the edge of a table top less. With 1e-3
@@ -58,7 +58,7 @@ std::optional<FlatMirrors::Plane> planeUnder(const scene::PatchScene& patches, c
   plane.distance = glm::dot(plane.normal, sum) / static_cast<double>(corners.size());
   plane.low = plane.high = corners.front();
   for (const auto& corner : corners) {
-    if (std::abs(plane.heightOf(corner)) > kSame) return std::nullopt;
+    if (std::abs(plane.heightOf(corner)) > kSamePlane) return std::nullopt;
     plane.low = glm::min(plane.low, corner);
     plane.high = glm::max(plane.high, corner);
   }
@@ -70,7 +70,7 @@ bool isSame(const FlatMirrors::Plane& a, const FlatMirrors::Plane& b) {
   const double sign = glm::dot(a.normal, b.normal) < 0.0 ? -1.0 : 1.0;
   const auto middle = 0.5 * (b.low + b.high), in_plane = middle - b.heightOf(middle) * b.normal;
   const double reach = 0.5 * glm::distance(b.low, b.high);
-  return std::abs(a.heightOf(in_plane)) + reach * glm::length(a.normal - sign * b.normal) <= kSame;
+  return std::abs(a.heightOf(in_plane)) + reach * glm::length(a.normal - sign * b.normal) <= kSamePlane;
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ constexpr double kNearPlane = 2e-4;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
 constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
 /// Sheets within this of the last may lie in the same place (geometry::RayScene).
-constexpr float kSame = 4e-6F;
+constexpr float kSameSheet = 4e-6F;
 
 /// Where in a frame a point of its plane lies.
 glm::dvec2 texelAt(const scene::TriangleFrame& frame, const glm::dvec3& point) {
@@ -228,7 +228,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       ++starts;
       sheets = 0;
       for (std::size_t i = 0; i < kMostSheets; ++i)
-        if (hit.t - distance[i] <= kSame && sheets < kMostSheets / 2) passed[sheets++] = passed[i];
+        if (hit.t - distance[i] <= kSameSheet && sheets < kMostSheets / 2) passed[sheets++] = passed[i];
       for (std::size_t i = 0; i < sheets; ++i) distance[i] = 0.0F;
       continue;
     }
@@ -257,7 +257,7 @@ bool LeafRays::isBeneath(const Side& side, std::uint32_t value) const {
 /// What lies in the same place as the hit and is seen there instead, if that is something: then the hit is that.
 bool LeafRays::uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                        std::span<std::uint32_t> passed, std::size_t sheets) const {
-  const geometry::Ray again{glm::vec3(origin), glm::vec3(direction), hit.t + kSame};
+  const geometry::Ray again{glm::vec3(origin), glm::vec3(direction), hit.t + kSameSheet};
   auto seen = hit;
   auto met = hit;
   for (passed[sheets++] = met.triangle; sheets < passed.size(); passed[sheets++] = met.triangle) {

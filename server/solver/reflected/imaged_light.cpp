@@ -23,7 +23,7 @@ constexpr double kAskAgain = 0.25;
 /// Rays of a look: to the mirror, and from there to the lamp.
 constexpr std::uint32_t kRays = 2;
 /// Of the width of a leaf: a ball around its middle, which may be a spot at the corner of one that is covered in part.
-constexpr double kAround = 1.5;
+constexpr double kAroundLeaf = 1.5;
 /// First looks of leaves that are looked from together: a few hundredths of a second.
 constexpr std::uint32_t kLeavesAtOnce = 4096;
 /// Of the rows that are looked from together two are so for their neighbours alone.
@@ -165,7 +165,7 @@ std::vector<ImagedLight::Leaf> ImagedLight::look(const Look& look) const {
     if (rays_->areaOf(leaf.value) <= 0.0) continue;
     leaf.number = shading_ != nullptr && !shading_->empty() ? shading_->numberOf(leaf.value) : scene::kNone;
     const auto middle = rays_->placeOn(leaf.value, {0.5, 0.5});
-    may_see[i] = lamps_.images->maySee(image, middle.position, kAround * rays_->widthOf(leaf.value));
+    may_see[i] = lamps_.images->maySee(image, middle.position, kAroundLeaf * rays_->widthOf(leaf.value));
     if (may_see[i]) seen[i] = lookFrom(image, times_ * kFirstLooks, leaf);
   }
   const auto isEdge = [&](std::uint32_t i) {

@@ -10,6 +10,7 @@
 
 #include "tests/accuracy/balance.h"
 #include "tests/accuracy/compare.h"
+#include "tests/accuracy/solve/solved.h"
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/shapes.h"
@@ -20,12 +21,7 @@ namespace {
 using test_scenes::Light;
 using test_scenes::TestScene;
 
-struct Solved {
-  LitScene lit;
-  nlohmann::json report;
-};
-
-Solved solveFile(const std::filesystem::path& file, const std::vector<std::string>& arguments) {
+Solved solveLightsFile(const std::filesystem::path& file, const std::vector<std::string>& arguments) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "accuracy" /
                       (std::string(test->test_suite_name()) + "." + test->name());
@@ -34,15 +30,15 @@ Solved solveFile(const std::filesystem::path& file, const std::vector<std::strin
   return {readLitScene(run.output, file), run.report};
 }
 
-Solved solve(const TestScene& scene, const std::vector<std::string>& arguments) {
+Solved solveLights(const TestScene& scene, const std::vector<std::string>& arguments) {
   const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "accuracy" / "lights";
   std::filesystem::create_directories(folder);
   const auto file = folder / (scene.name + ".glb");
   test_scenes::writeGlb(scene, file);
-  return solveFile(file, arguments);
+  return solveLightsFile(file, arguments);
 }
 
-Accuracy compare(const Solved& solved, std::size_t texels = 800) {
+Accuracy compareLights(const Solved& solved, std::size_t texels = 800) {
   const auto reference =
       makeReference(solved.lit, {.texel_samples = 4096, .point_samples = 64, .texels = texels, .points = 1});
   const auto accuracy = measure(solved.lit, reference);
@@ -92,7 +88,7 @@ constexpr double kMiddleForMean = 0.005;
 TEST(SolvedLights, PointLightOverAPlane) {
   auto scene = blackFloor("point");
   scene.lights.push_back({.position = kPoint, .intensity = kCandela});
-  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
+  const auto solved = solveLights(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
   EXPECT_LT(rmsFrom(solved.lit, &underThePoint), kMiddleForMean);
   expectBalance(solved.report);
   const double candela = 0.2126 * 100.0 + 0.7152 * 50.0 + 0.0722 * 20.0;
@@ -106,7 +102,7 @@ TEST(SolvedLights, ADiscOverAPlaneIsItsFormFactor) {
                           .target = {0.2, 0.0, 0.1},
                           .intensity = {1000.0, 500.0, 200.0},
                           .radius_m = 0.6});
-  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  const auto solved = solveLights(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
   EXPECT_LT(rmsFrom(solved.lit,
                     [](const glm::dvec3& at) {
                       const double h2 = 1.5 * 1.5, r2 = 0.6 * 0.6;
@@ -129,7 +125,7 @@ TEST(SolvedLights, ARectangleOverAPlaneIsWhatItsPointsAddUpTo) {
                           .intensity = glm::dvec3(1000.0),
                           .width_m = 1.2,  // along Z, since it shines straight down
                           .height_m = 0.4});
-  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  const auto solved = solveLights(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
   EXPECT_LT(rmsFrom(solved.lit,
                     [](const glm::dvec3& at) {
                       double sum = 0.0;
@@ -147,7 +143,7 @@ TEST(SolvedLights, ARectangleOverAPlaneIsWhatItsPointsAddUpTo) {
 TEST(SolvedLights, AGlobeOverAPlaneIsAPointOfItsFlux) {
   auto scene = blackFloor("globe");
   scene.lights.push_back({.position = kPoint, .intensity = kCandela, .radius_m = 0.5});
-  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
+  const auto solved = solveLights(scene, {"--error", "0.005", "--time-limit", "20", "--texels", "1600"});
   EXPECT_LT(rmsFrom(solved.lit, &underThePoint), kMiddleForMean);
   expectBalance(solved.report);
 }
@@ -156,7 +152,7 @@ TEST(SolvedLights, SunOnAPlane) {
   auto scene = blackFloor("sun");
   scene.lights.push_back(
       {.kind = Light::Kind::kDirectional, .position = {1, 2, 1}, .target = {}, .intensity = glm::dvec3(1000.0)});
-  const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
+  const auto solved = solveLights(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
   const double exact = 1000.0 * 2.0 / std::sqrt(6.0);
   // The one link of every texel is the same, and kept to half a unit of its eleventh bit.
   EXPECT_LT(rmsFrom(solved.lit, [&](const glm::dvec3&) { return glm::dvec3(exact); }), 0x1p-12);
@@ -164,14 +160,14 @@ TEST(SolvedLights, SunOnAPlane) {
 }
 
 TEST(SolvedLights, SkyOverAPlaneFromTheCommandLine) {
-  const auto solved = solve(blackFloor("sky"), {"--error", "0.005", "--time-limit", "10", "--texels", "1600", "--sky",
-                                                "100,200,300/10,20,30"});
+  const auto solved = solveLights(blackFloor("sky"), {"--error", "0.005", "--time-limit", "10", "--texels", "1600",
+                                                      "--sky", "100,200,300/10,20,30"});
   EXPECT_LT(rmsFrom(solved.lit, [](const glm::dvec3&) { return std::numbers::pi * glm::dvec3(100, 200, 300); }), 1e-4);
   expectBalance(solved.report);
 }
 
 TEST(SolvedLights, ASceneInWhichNothingShinesSaysSoAndNamesTheSky) {
-  const auto solved = solve(blackFloor("dark"), {"--texels", "400"});
+  const auto solved = solveLights(blackFloor("dark"), {"--texels", "400"});
   const auto warnings = solved.report.at("warnings").dump();
   EXPECT_NE(warnings.find("nothing shines"), std::string::npos) << warnings;
   EXPECT_NE(warnings.find("--sky"), std::string::npos) << warnings;
@@ -211,8 +207,8 @@ TEST(SolvedLights, ARoomWithAPointLightASpotAndTheSunMatchesThePathTracer) {
                           .outer_cone_rad = 0.5});
   scene.lights.push_back(
       {.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
-  const auto solved = solve(scene, kRoomArguments);
-  const auto accuracy = compare(solved);
+  const auto solved = solveLights(scene, kRoomArguments);
+  const auto accuracy = compareLights(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
   expectBalance(solved.report);
@@ -239,8 +235,8 @@ TEST(SolvedLights, ARoomWithLampsOfASizeMatchesThePathTracer) {
                           .inner_cone_rad = 0.2,
                           .outer_cone_rad = 0.5,
                           .radius_m = 0.05});
-  const auto solved = solve(scene, kRoomArguments);
-  const auto accuracy = compare(solved);
+  const auto solved = solveLights(scene, kRoomArguments);
+  const auto accuracy = compareLights(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
   expectBalance(solved.report);
@@ -250,8 +246,8 @@ TEST(SolvedLights, ARoomOpenToTheSkyMatchesThePathTracer) {
   auto scene = furnishedRoom("room_sky");
   scene.sky_upper_nits = {80.0, 100.0, 140.0};
   scene.sky_lower_nits = {30.0, 25.0, 20.0};
-  const auto solved = solve(scene, kRoomArguments);
-  const auto accuracy = compare(solved);
+  const auto solved = solveLights(scene, kRoomArguments);
+  const auto accuracy = compareLights(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
   expectBalance(solved.report);
@@ -263,8 +259,8 @@ TEST(SolvedLights, ARoomWithAHalfOpaqueScreenMatchesThePathTracer) {
   scene.objects.push_back(
       {"screen", {}, {{{{-0.9, 1.0, -0.9}, {-0.9, 1.0, 0.9}, {0.9, 1.0, 0.9}, {0.9, 1.0, -0.9}}, veil}}});
   scene.lights.push_back({.position = {0.3, 1.4, 0.3}, .intensity = glm::dvec3(40.0)});
-  const auto solved = solve(scene, kRoomArguments);
-  const auto accuracy = compare(solved);
+  const auto solved = solveLights(scene, kRoomArguments);
+  const auto accuracy = compareLights(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
   expectBalance(solved.report);
@@ -277,8 +273,8 @@ std::filesystem::path sharedScene(const std::string& name) {
 TEST(SolvedLights, PlaycanvasLightsMatchThePathTracer) {
   const auto file = sharedScene("features/playcanvas_Lights.glb");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
-  const auto solved = solveFile(file, {"--error", "0.01", "--time-limit", "20", "--texels", "2000", "--means"});
-  const auto accuracy = compare(solved);
+  const auto solved = solveLightsFile(file, {"--error", "0.01", "--time-limit", "20", "--texels", "2000", "--means"});
+  const auto accuracy = compareLights(solved);
   EXPECT_LT(accuracy.solver.solverRms(), 0.02);  // a cube: no shadows, no interreflection
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.005);
   expectBalance(solved.report);
@@ -287,8 +283,8 @@ TEST(SolvedLights, PlaycanvasLightsMatchThePathTracer) {
 TEST(SolvedLights, MixedLightingMatchesThePathTracer) {
   const auto file = sharedScene("bevy_MixedLighting/MixedLightingExample.gltf");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
-  const auto solved = solveFile(file, {"--error", "0.05", "--time-limit", "60", "--texels", "6000"});
-  const auto accuracy = compare(solved);
+  const auto solved = solveLightsFile(file, {"--error", "0.05", "--time-limit", "60", "--texels", "6000"});
+  const auto accuracy = compareLights(solved);
   // Texels of the chair's curved charts bend by 15 degrees, and its metal varies within them.
   EXPECT_LT(accuracy.solver.solverRms(), 0.10);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.03);
@@ -298,7 +294,7 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   const auto file = sharedScene("features/AlphaBlendModeTest/AlphaBlendModeTest.gltf");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto solved =
-      solveFile(file, {"--error", "0.03", "--time-limit", "60", "--texels", "6000", "--sky", "1000/300"});
+      solveLightsFile(file, {"--error", "0.03", "--time-limit", "60", "--texels", "6000", "--sky", "1000/300"});
   auto compared = solved;
   setSky("1000/300", compared.lit);
   // Labels lie on the sloping front of the bed, one on another, closer than single precision tells apart: what is below
@@ -306,7 +302,7 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   for (auto& triangle : compared.lit.scene.triangles) {
     if (std::abs(std::abs(triangle.normal.y) - 0.83) < 0.01) triangle.lightmap_page = -1;
   }
-  const auto accuracy = compare(compared);
+  const auto accuracy = compareLights(compared);
   EXPECT_LT(accuracy.solver.solverRms(), 0.05);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
 }

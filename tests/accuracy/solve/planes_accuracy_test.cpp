@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-fs::path fileOf(const std::string& name) {
+fs::path sceneFileOf(const std::string& name) {
   const auto built = fs::path(RADIOSITY_BINARY_DIR) / "scenes" / (name + ".glb");
   return fs::exists(built) ? built : fs::path(RADIOSITY_SHARED_DIR) / "scenes" / (name + ".glb");
 }
@@ -86,7 +86,7 @@ double luminous(const glm::dvec3& light) { return 0.2126 * light.x + 0.7152 * li
 class SolvedPlane : public testing::TestWithParam<const char*> {};
 
 TEST_P(SolvedPlane, HasTheLightOfThePathTracerWithinWhatIsStated) {
-  const auto file = fileOf(GetParam());
+  const auto file = sceneFileOf(GetParam());
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / ("SolvedPlane." + std::string(GetParam()));
   fs::create_directories(folder);

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using test_scenes::TestScene;
 
-LitScene solveFile(const fs::path& file, const std::vector<std::string>& arguments) {
+LitScene solveShadingFile(const fs::path& file, const std::vector<std::string>& arguments) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / (std::string("shading.") + test->name());
   const auto run = runSolve(RADIOSITY_CLIENT, file, folder, arguments);
@@ -29,11 +29,11 @@ LitScene solveFile(const fs::path& file, const std::vector<std::string>& argumen
   return readLitScene(run.output);
 }
 
-LitScene solve(const TestScene& scene, const std::vector<std::string>& arguments) {
+LitScene solveShading(const TestScene& scene, const std::vector<std::string>& arguments) {
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / "shading";
   fs::create_directories(folder);
   test_scenes::writeGlb(scene, folder / (scene.name + ".glb"));
-  return solveFile(folder / (scene.name + ".glb"), arguments);
+  return solveShadingFile(folder / (scene.name + ".glb"), arguments);
 }
 
 /// Irradiance at a place of a facet.
@@ -43,7 +43,8 @@ struct Compared {
   double relative_rms = 0.0, mean_ratio = 0.0;
 };
 /// Of the texels of a node, against the mean of the formula over what lies under each.
-Compared compare(const LitScene& lit, const std::function<bool(const glm::dvec3&)>& is_of, const Formula& formula) {
+Compared compareShading(const LitScene& lit, const std::function<bool(const glm::dvec3&)>& is_of,
+                        const Formula& formula) {
   double square = 0.0, exact_square = 0.0, found = 0.0, expected = 0.0;
   for (const auto& texel : findTexels(lit)) {
     double exact = 0.0, area = 0.0;
@@ -90,8 +91,9 @@ TEST(SmoothNormals, ABallOfFewFacetsInTheSunIsLitAsARoundOne) {
                           .position = {1, 2, 1},
                           .target = {},
                           .intensity = glm::dvec3(1000.0)});
-  const auto lit = solve(scene, {"--error", "0.01", "--time-limit", "10", "--texels", "12000"});
-  const auto compared = compare(lit, anywhere, sunOnBall({1, 2, 3}, glm::normalize(glm::dvec3(1, 2, 1)), 1000.0));
+  const auto lit = solveShading(scene, {"--error", "0.01", "--time-limit", "10", "--texels", "12000"});
+  const auto compared =
+      compareShading(lit, anywhere, sunOnBall({1, 2, 3}, glm::normalize(glm::dvec3(1, 2, 1)), 1000.0));
   EXPECT_LT(compared.relative_rms, kOfTheSun);
   EXPECT_NEAR(compared.mean_ratio, 1.0, 0.002);
 }
@@ -99,9 +101,9 @@ TEST(SmoothNormals, ABallOfFewFacetsInTheSunIsLitAsARoundOne) {
 TEST(SmoothNormals, TheSharedCaseHasItsRightValue) {
   const auto file = fs::path(RADIOSITY_SHARED_DIR) / "cases" / "smooth-normals-ball.glb";
   if (!fs::exists(file)) GTEST_SKIP() << "no shared cases here";
-  const auto lit = solveFile(file, {"--error", "0.01", "--time-limit", "10"});
+  const auto lit = solveShadingFile(file, {"--error", "0.01", "--time-limit", "10"});
   const glm::dquat sun(0.7889051662368267, -0.14595403888902017, 0.586969624326502, 0.10859427855477606);
-  const auto compared = compare(lit, anywhere, sunOnBall(glm::dvec3(0.0), sun * glm::dvec3(0, 0, 1), 1000.0));
+  const auto compared = compareShading(lit, anywhere, sunOnBall(glm::dvec3(0.0), sun * glm::dvec3(0, 0, 1), 1000.0));
   EXPECT_LT(compared.relative_rms, kOfTheSun);
   EXPECT_NEAR(compared.mean_ratio, 1.0, 0.002);
 }
@@ -122,10 +124,10 @@ TEST(SmoothNormals, ABallInAFurnaceGetsWhatIsAboveBothHorizons) {
   test_scenes::Object ball{"ball", at, {}};
   test_scenes::appendSphere(ball, at, 0.4, 1, scene.objects[0].polygons[0].material, false, true);
   scene.objects.push_back(std::move(ball));
-  const auto lit = solve(scene, {"--error", "0.01", "--time-limit", "20", "--texels", "8000"});
+  const auto lit = solveShading(scene, {"--error", "0.01", "--time-limit", "20", "--texels", "8000"});
   const double whole = std::numbers::pi / (1.0 - 0.5);
   const auto isOfBall = [&](const glm::dvec3& p) { return glm::distance(p, at) < 0.5; };
-  const auto compared = compare(lit, isOfBall, [&](const glm::dvec3& p, const glm::dvec3& facet) {
+  const auto compared = compareShading(lit, isOfBall, [&](const glm::dvec3& p, const glm::dvec3& facet) {
     return 0.5 * whole * (1.0 + glm::dot(glm::normalize(p - at), facet));
   });
   EXPECT_LT(compared.relative_rms, 0.015);  // the error that was asked for, and what ratios of few rays add

@@ -9,6 +9,7 @@
 
 #include "tests/accuracy/balance.h"
 #include "tests/accuracy/compare.h"
+#include "tests/accuracy/solve/solved.h"
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/hdr_writer.h"
@@ -27,12 +28,7 @@ std::filesystem::path folder() {
   return made;
 }
 
-struct Solved {
-  LitScene lit;
-  nlohmann::json report;
-};
-
-Solved solve(const TestScene& scene, const std::vector<std::string>& arguments) {
+Solved solveUnderSky(const TestScene& scene, const std::vector<std::string>& arguments) {
   const auto file = folder() / (scene.name + ".glb");
   test_scenes::writeGlb(scene, file);
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
@@ -71,7 +67,7 @@ glm::dvec3 meanOf(const LitScene& lit) {
 TEST(SkyPicture, OfOneColourBringsPiTimesItToAnOpenPlane) {
   const auto sky = picture("even", 64, [](const glm::dvec3&) { return glm::dvec3(1000, 500, 252); });
   const auto solved =
-      solve(floorScene("even"), {"--error", "0.01", "--time-limit", "20", "--texels", "400", "--sky", sky});
+      solveUnderSky(floorScene("even"), {"--error", "0.01", "--time-limit", "20", "--texels", "400", "--sky", sky});
   const auto mean = meanOf(solved.lit);
   EXPECT_NEAR(mean.x / (kPi * 1000.0), 1.0, 0.005);
   EXPECT_NEAR(mean.z / (kPi * 252.0), 1.0, 0.005);
@@ -86,7 +82,7 @@ TEST(SkyPicture, IsMultipliedAndTurnsWithItsOptions) {
   const auto towards = [&](const char* turn) {
     auto arguments = usual;
     arguments.insert(arguments.end(), {"--sky-strength", "100", "--sky-rotation", turn});
-    return meanOf(solve(wall, arguments).lit).x / (100.0 * kPi);
+    return meanOf(solveUnderSky(wall, arguments).lit).x / (100.0 * kPi);
   };
   EXPECT_NEAR(towards("0"), 2.0, 0.02) << "half of each";
   EXPECT_NEAR(towards("90"), 3.0, 0.03) << "from +X to -Z";
@@ -129,15 +125,15 @@ glm::dvec3 sunnyDay(const glm::dvec3& d) {
 TEST(SkyPicture, OfASunnyDayIsWhatThePathTracerHas) {
   const auto sky = picture("sunny", 1024, &sunnyDay);
   const auto solved =
-      solve(furnished("sunny"), {"--error", "0.01", "--time-limit", "60", "--texels", "3000", "--sky", sky});
+      solveUnderSky(furnished("sunny"), {"--error", "0.01", "--time-limit", "60", "--texels", "3000", "--sky", sky});
   EXPECT_LT(rmsOf(solved), 2.0 * std::max(0.01, solved.report.at("error").at("texels").get<double>()));
   expectBalance(solved.report);
 }
 
 TEST(SkyPicture, IsTheSameByShooting) {
   const auto sky = picture("sunny", 1024, &sunnyDay);
-  const auto solved = solve(furnished("shooting"), {"--error", "0.03", "--time-limit", "60", "--texels", "1500",
-                                                    "--sky", sky, "--method", "shooting"});
+  const auto solved = solveUnderSky(furnished("shooting"), {"--error", "0.03", "--time-limit", "60", "--texels", "1500",
+                                                            "--sky", sky, "--method", "shooting"});
   EXPECT_LT(rmsOf(solved), 2.0 * std::max(0.03, solved.report.at("error").at("texels").get<double>()));
 }
 
@@ -145,7 +141,8 @@ TEST(Daylight, OvercastIsTheSkyOfMoonAndSpencer) {
   auto wall = floorScene("overcast");
   wall.objects[0].polygons[0].corners = {{-1, -1, 0}, {-1, 1, 0}, {1, 1, 0}, {1, -1, 0}};
   const std::vector<std::string> usual{"--error", "0.01", "--time-limit", "20", "--texels", "400", "--sky", "overcast"};
-  const double open = meanOf(solve(floorScene("overcast"), usual).lit).x, upright = meanOf(solve(wall, usual).lit).x;
+  const double open = meanOf(solveUnderSky(floorScene("overcast"), usual).lit).x,
+               upright = meanOf(solveUnderSky(wall, usual).lit).x;
   EXPECT_NEAR(open, 300.0 + 21'000.0 * std::sin(45.0 * kDegree), 80.0);
   // Of the sky (pi / 6 + 4 / 9) / (7 pi / 9) of what the ground has, and half of what that reflects.
   EXPECT_NEAR(upright / open, 0.396 + 0.5 * 0.2, 0.004);
@@ -164,7 +161,7 @@ TEST(Daylight, ItsSunHasAHalfShadowOfHalfADegree) {
                         .angle_deg = 0.533});
   // Means over texels, which are compared with the middles of these; others are what lookups between them need. Most of
   // the light, of which the error is a part, is on the edge, and all of the error is on the floor.
-  const auto solved = solve(sun, {"--error", "0.003", "--time-limit", "30", "--texels", "14400", "--means"});
+  const auto solved = solveUnderSky(sun, {"--error", "0.003", "--time-limit", "30", "--texels", "14400", "--means"});
   const double half = 20.0 * std::tan(0.5 * 0.533 * kDegree);
   double square = 0.0, area = 0.0;
   for (const auto& texel : findTexels(solved.lit)) {

@@ -16,8 +16,8 @@
 namespace radiosity::accuracy {
 namespace {
 
-LitScene solve(const test_scenes::TestScene& scene, const std::vector<std::string>& arguments,
-               nlohmann::json* report = nullptr) {
+LitScene solveScene(const test_scenes::TestScene& scene, const std::vector<std::string>& arguments,
+                    nlohmann::json* report = nullptr) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "accuracy" /
                       (std::string(test->test_suite_name()) + "." + test->name());
@@ -52,15 +52,15 @@ double rmsFromConstant(const LitScene& lit, double exact) {
 }
 
 TEST(SolvedScene, FurnaceOfReflectanceHalfIsWithinHalfAPercent) {
-  const auto lit = solve(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0)),
-                         {"--error", "0.002", "--time-limit", "20", "--texels", "1500"});
+  const auto lit = solveScene(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0)),
+                              {"--error", "0.002", "--time-limit", "20", "--texels", "1500"});
   EXPECT_LT(rmsFromConstant(lit, 2.0 * std::numbers::pi), 0.005);
   EXPECT_LT(worstFromConstant(lit, 2.0 * std::numbers::pi), 0.05);
 }
 
 TEST(SolvedScene, FurnaceOfReflectanceNineTenthsIsWithinOnePercent) {
-  const auto lit = solve(test_scenes::furnace(glm::dvec3(0.9), glm::dvec3(1.0)),
-                         {"--error", "0.004", "--time-limit", "20", "--texels", "1500"});
+  const auto lit = solveScene(test_scenes::furnace(glm::dvec3(0.9), glm::dvec3(1.0)),
+                              {"--error", "0.004", "--time-limit", "20", "--texels", "1500"});
   EXPECT_LT(rmsFromConstant(lit, 10.0 * std::numbers::pi), 0.01);
 }
 
@@ -74,7 +74,8 @@ TEST(SolvedScene, AFurnaceStatesWhatItErrsBy) {
     double stated = 0.0, real = 0.0;
     for (const auto* seed : {"1", "2", "3"}) {
       nlohmann::json report;
-      const auto lit = solve(test_scenes::furnace(glm::dvec3(reflectance), glm::dvec3(1.0)), {"--seed", seed}, &report);
+      const auto lit =
+          solveScene(test_scenes::furnace(glm::dvec3(reflectance), glm::dvec3(1.0)), {"--seed", seed}, &report);
       const double exact = std::numbers::pi / (1.0 - reflectance);
       stated += std::pow(report["error"]["texels"].get<double>(), 2.0);
       real += std::pow(rmsFromConstant(lit, exact), 2.0);
@@ -86,7 +87,7 @@ TEST(SolvedScene, AFurnaceStatesWhatItErrsBy) {
 
 TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
   nlohmann::json report;
-  const auto lit = solve(test_scenes::cornell(), {"--error", "0.02", "--time-limit", "30"}, &report);
+  const auto lit = solveScene(test_scenes::cornell(), {"--error", "0.02", "--time-limit", "30"}, &report);
   const auto reference =
       makeReference(lit, {.texel_samples = 4096, .point_samples = 4096, .texels = 800, .points = 500});
   const auto accuracy = measure(lit, reference);
@@ -122,7 +123,7 @@ test_scenes::TestScene roomWithARim() {
 
 TEST(SolvedScene, LightThatVariesWithinTexelsIsCorrectedAndStated) {
   nlohmann::json report;
-  const auto lit = solve(roomWithARim(), {"--error", "0.02", "--time-limit", "60", "--texels", "12000"}, &report);
+  const auto lit = solveScene(roomWithARim(), {"--error", "0.02", "--time-limit", "60", "--texels", "12000"}, &report);
   EXPECT_LE(report["error"]["texels"].get<double>(), 0.02);
   std::vector<Texel> rim;
   std::vector<oracle::Footprint> footprints;
@@ -177,7 +178,7 @@ test_scenes::TestScene roomsWithAHole() {
 // Rays that hardly ever find the hole make halves differ after many bounces, which more looks of the lamp do not lower.
 TEST(SolvedScene, WhiteRoomsWithAHoleBetweenThemReachTheirError) {
   nlohmann::json report;
-  const auto lit = solve(roomsWithAHole(), {"--error", "0.02", "--time-limit", "60"}, &report);
+  const auto lit = solveScene(roomsWithAHole(), {"--error", "0.02", "--time-limit", "60"}, &report);
   EXPECT_TRUE(report["reached"].get<bool>());
   EXPECT_LE(report["error"]["texels"].get<double>(), 0.02);
   EXPECT_FALSE(lit.pages.empty());
@@ -203,7 +204,7 @@ TEST(SolvedScene, NoTexelIsDarkerThanBlack) {
 
 TEST(SolvedScene, EnergyOfTheReportBalances) {
   nlohmann::json report;
-  solve(test_scenes::cornell(), {"--error", "0.1", "--time-limit", "10", "--texels", "2000"}, &report);
+  solveScene(test_scenes::cornell(), {"--error", "0.1", "--time-limit", "10", "--texels", "2000"}, &report);
   const auto& e = report.at("energy");
   const double emitted = e.at("emitted");
   const double found = e.at("absorbed").get<double>() + e.at("escaped").get<double>() + e.at("backface").get<double>() +

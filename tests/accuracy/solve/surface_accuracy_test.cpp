@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 class SolvedSurface : public testing::TestWithParam<const char*> {};
 
-fs::path fileOf(const std::string& name) {
+fs::path sceneOrCaseFileOf(const std::string& name) {
   const auto built = fs::path(RADIOSITY_BINARY_DIR) / "scenes" / (name + ".glb");
   const auto shared = fs::path(RADIOSITY_SHARED_DIR), scene = shared / "scenes" / (name + ".glb");
   return fs::exists(built) ? built : fs::exists(scene) ? scene : shared / "cases" / (name + ".glb");
@@ -40,12 +40,12 @@ bool hasDoubleSided(const fs::path& file) {
 }
 
 TEST_P(SolvedSurface, IsAsBrightAsTheTruthAndDarkWhereItIsDark) {
-  const auto file = fileOf(GetParam());
+  const auto file = sceneOrCaseFileOf(GetParam());
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / ("SolvedSurface." + std::string(GetParam()));
   const auto run = runSolve(RADIOSITY_CLIENT, file, folder, {"--error", "0.02", "--time-limit", "60"});
   ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 3) << run.last_line;
-  const auto lit = readLitScene(run.output, fileOf(truthOf(GetParam())));
+  const auto lit = readLitScene(run.output, sceneOrCaseFileOf(truthOf(GetParam())));
   const auto points = findPart(lit, {.point_samples = pathsFor(GetParam()), .points = 2000}, ReferencePart::kPoints,
                                fs::path(RADIOSITY_BINARY_DIR) / "references")
                           .reference.points;

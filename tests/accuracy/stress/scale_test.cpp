@@ -9,19 +9,19 @@
 namespace radiosity::accuracy {
 namespace {
 
-constexpr std::uint64_t kTexels = 1500;
+constexpr std::uint64_t kRoomTexels = 1500;
 
 Loaded withLight(double factor) {
   auto scene = litRoom();
   for (auto& material : scene.materials) material.emission_nits *= factor;
-  return load(scene, kTexels);
+  return load(scene, kRoomTexels);
 }
 
 TEST(Scale, OfLengthsByAPowerOfTwoChangesNoBit) {
-  Solve one(load(litRoom(), kTexels));
+  Solve one(load(litRoom(), kRoomTexels));
   one.run();
   for (const int power : {-26, 26}) {
-    Solve scaled(load(litRoom(std::ldexp(1.0, power)), kTexels));
+    Solve scaled(load(litRoom(std::ldexp(1.0, power)), kRoomTexels));
     scaled.run();
     EXPECT_EQ(scaled.solver().irradiance(), one.solver().irradiance()) << power;
     EXPECT_EQ(scaled.solver().shots(), one.solver().shots()) << power;
@@ -29,10 +29,10 @@ TEST(Scale, OfLengthsByAPowerOfTwoChangesNoBit) {
 }
 
 TEST(Scale, OfLengthsFromATenMillionthToATenMillionGivesTheSameAnswer) {
-  Solve one(load(litRoom(), kTexels));
+  Solve one(load(litRoom(), kRoomTexels));
   one.run();
   for (const double scale : {1e-8, 1e-4, 1e4, 1e8}) {
-    Solve scaled(load(litRoom(scale), kTexels));
+    Solve scaled(load(litRoom(scale), kRoomTexels));
     EXPECT_TRUE(scaled.run());
     expectSound(scaled);
     // The corners in the file are rounded to floats: 6e-8, which moves some pixels of the hemicubes' images across an
@@ -67,10 +67,10 @@ TEST(Scale, OfLightFromATenMillionthToATenMillionGivesTheSameAnswer) {
 }
 
 TEST(Offset, OfAMillionTimesTheSizeGivesTheSameAnswer) {
-  Solve near(load(litRoom(), kTexels));
+  Solve near(load(litRoom(), kRoomTexels));
   near.run();
   // Not a number with few digits, which would leave the corners' low bits alone.
-  Solve far(load(litRoom(1.0, {2.5e6 + 0.1, -1.7e6 - 0.3, 3.1e6 + 0.7}), kTexels));
+  Solve far(load(litRoom(1.0, {2.5e6 + 0.1, -1.7e6 - 0.3, 3.1e6 + 0.7}), kRoomTexels));
   EXPECT_TRUE(far.run());
   expectSound(far);
   EXPECT_EQ(far.solver().shots(), near.solver().shots());

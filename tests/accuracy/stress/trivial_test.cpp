@@ -13,7 +13,7 @@ namespace {
 
 using test_scenes::TestScene;
 
-constexpr std::uint64_t kTexels = 400;
+constexpr std::uint64_t kFewTexels = 400;
 /// Instant: no more images than the samples of one lamp.
 constexpr std::uint64_t kFewShots = 300;
 
@@ -37,7 +37,7 @@ TEST(Trivial, NoPolygonIsDoneAtOnce) {
 }
 
 TEST(Trivial, OnePolygonWithoutLightIsDarkAtOnce) {
-  Solve solve(load(floorOf(glm::dvec3(0.5), glm::dvec3(0.0)), kTexels));
+  Solve solve(load(floorOf(glm::dvec3(0.5), glm::dvec3(0.0)), kFewTexels));
   EXPECT_TRUE(solve.run(2));
   EXPECT_EQ(solve.solver().shots(), 0U);
   EXPECT_EQ(solve.solver().error().total, 0.0);
@@ -45,7 +45,7 @@ TEST(Trivial, OnePolygonWithoutLightIsDarkAtOnce) {
 }
 
 TEST(Trivial, OnePolygonThatShinesSendsItAllAway) {
-  Solve solve(load(floorOf(glm::dvec3(0.5), glm::dvec3(2.0)), kTexels));
+  Solve solve(load(floorOf(glm::dvec3(0.5), glm::dvec3(2.0)), kFewTexels));
   EXPECT_TRUE(solve.run(100));
   EXPECT_LT(solve.solver().shots(), kFewShots);
   expectDark(solve);
@@ -56,7 +56,7 @@ TEST(Trivial, OnePolygonThatShinesSendsItAllAway) {
 }
 
 TEST(Trivial, ARoomWithoutLightIsDarkAtOnce) {
-  Solve solve(load(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(0.0)), kTexels));
+  Solve solve(load(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(0.0)), kFewTexels));
   EXPECT_TRUE(solve.run(2));
   EXPECT_EQ(solve.solver().shots(), 0U);
   expectDark(solve);
@@ -65,7 +65,7 @@ TEST(Trivial, ARoomWithoutLightIsDarkAtOnce) {
 TEST(Trivial, ABlackRoomHasDirectLightOnly) {
   auto scene = litRoom();
   for (auto& material : scene.materials) material.reflectance = glm::dvec3(0.0);
-  Solve solve(load(scene, kTexels));
+  Solve solve(load(scene, kFewTexels));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   EXPECT_EQ(solve.solver().plannerCounters().shooters, 0U) << "black never shoots";
@@ -74,7 +74,7 @@ TEST(Trivial, ABlackRoomHasDirectLightOnly) {
 }
 
 TEST(Trivial, ARoomInWhichAllShinesAndNothingReflectsIsItsOwnEmission) {
-  Solve solve(load(test_scenes::furnace(glm::dvec3(0.0), glm::dvec3(3.0)), kTexels));
+  Solve solve(load(test_scenes::furnace(glm::dvec3(0.0), glm::dvec3(3.0)), kFewTexels));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   EXPECT_LT(std::abs(compareToConstant(solve, 3.0 * std::numbers::pi).mean), 1e-4);
@@ -88,7 +88,7 @@ TEST(Trivial, ALampOutsideAClosedRoomLeavesItDark) {
   appendBox(lamp, {5.0, 0.0, 0.0}, {5.5, 0.5, 0.5}, test_scenes::allFaces(light));
   scene.objects.push_back(lamp);
   scene.lights.push_back({.position = {-3.0, 1.0, 1.0}, .intensity = glm::dvec3(500.0)});
-  Solve solve(load(scene, kTexels));
+  Solve solve(load(scene, kFewTexels));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   EXPECT_LT(solve.solver().shots(), kFewShots);

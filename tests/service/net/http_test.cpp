@@ -21,8 +21,6 @@ namespace {
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
-constexpr const char* kSecret = "0123456789abcdef0123456789abcdef";
-
 net::ServerOptions withToken() {
   net::ServerOptions options;
   options.token = kSecret;

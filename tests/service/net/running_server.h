@@ -12,6 +12,9 @@
 
 namespace radiosity::testing {
 
+/// A token as servers may want it.
+inline constexpr const char* kSecret = "0123456789abcdef0123456789abcdef";
+
 class RunningServer {
  public:
   explicit RunningServer(net::ServerOptions options = {}, FakeEngine::Layout layout = {}) : engine(layout) {

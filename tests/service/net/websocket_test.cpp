@@ -25,8 +25,6 @@ using namespace protocol;  // NOLINT: the test speaks the protocol
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
-constexpr const char* kSecret = "0123456789abcdef0123456789abcdef";
-
 TEST(Handshake, TheServerIntroducesItselfFirst) {
   RunningServer server;
   TestSocket socket(server.port());

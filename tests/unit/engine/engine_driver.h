@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <future>
 #include <memory>
@@ -69,6 +70,8 @@ class Recorder final : public engine::Listener {
 
 /// A target that these small scenes reach in well under a second; and one that they never reach.
 inline constexpr double kEasy = 0.2, kNever = 1e-9;
+/// Of a cube with the options of EngineTest: six faces of 1 m2 and 5 x 5 texels.
+inline constexpr std::size_t kCubeTexels = 150;
 
 class EngineTest : public testing::Test {
  protected:

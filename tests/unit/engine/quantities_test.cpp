@@ -15,9 +15,6 @@ namespace {
 using engine::Quantity;
 using test_scenes::lumpedCube;
 
-/// The test's cube: six faces of 1 m2 and 5 x 5 texels.
-constexpr std::size_t kTexels = 150;
-
 class Quantities : public EngineTest {
  protected:
   /// The first lightmaps of a quantity that come while it is watched.
@@ -104,7 +101,7 @@ TEST_F(Quantities, RadiosityIsEmissionAndWhatIsReflected) {
   const auto ids = shown(Quantity::kPatchId);
   const auto irradiance = values(*engine().lightmaps(), *ids);
   const auto radiosity = values(*shown(Quantity::kRadiosity), *ids);
-  ASSERT_EQ(irradiance.size(), kTexels);
+  ASSERT_EQ(irradiance.size(), kCubeTexels);
   int lamps = 0;
   for (std::size_t i = 0; i < irradiance.size(); ++i) {
     const float emitted = radiosity[i] - 0.5F * irradiance[i];  // 1 lux from one face
@@ -122,7 +119,7 @@ TEST_F(Quantities, PatchIdsAreAllDifferentAndNormalsPointAlongTheAxes) {
     if (id == engine::kNoId) continue;
     EXPECT_TRUE(seen.insert(id).second);
   }
-  EXPECT_EQ(seen.size(), kTexels);
+  EXPECT_EQ(seen.size(), kCubeTexels);
   EXPECT_TRUE(std::ranges::all_of(seen, [&](auto id) { return id < status().nodes; }));
   for (const auto x : values(*shown(Quantity::kNormal), *ids))
     EXPECT_TRUE(std::abs(x - 0.5F) < 1e-6F || x < 1e-6F || x > 1.0F - 1e-6F) << x;

@@ -60,17 +60,14 @@ class Texels : public EngineTest {
   }
 };
 
-/// Six faces of 5 x 5 texels.
-constexpr std::size_t kTexels = 150;
-
 TEST_F(Texels, HaveWhatThePagesOfBothQuantitiesHave) {
   solve(lumpedCube(0.5));
-  EXPECT_EQ(compareAll(), kTexels);
+  EXPECT_EQ(compareAll(), kCubeTexels);
   ASSERT_TRUE(patch(emissionPatch(0, 7.0)));
   ASSERT_TRUE(reaches(State::kConverged));
   const auto revision = status().revision;
   ASSERT_TRUE(eventually([&] { return texel(0, 2, 2)->revision == revision; })) << "what was made before is let go";
-  EXPECT_EQ(compareAll(), kTexels);
+  EXPECT_EQ(compareAll(), kCubeTexels);
 }
 
 TEST_F(Texels, AreReadThoughNobodyWatches) {
@@ -124,7 +121,7 @@ TEST_F(Texels, OfAnotherLayoutAreNotThoseOfTheOld) {
   }));
   ASSERT_TRUE(reaches(State::kConverged));
   ASSERT_TRUE(eventually([&] { return texel(0, 2, 2)->error.x > 0.0F; }));
-  EXPECT_GT(compareAll(), kTexels);
+  EXPECT_GT(compareAll(), kCubeTexels);
 }
 
 /// All of them wait for the same pages, however many there are, and none of what must not wait does.

@@ -6,21 +6,17 @@
 #include <numbers>
 
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
 using test::GltfBuilder;
+using test::imported;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using Json = nlohmann::json;
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
-}
 
 /// The place where `builder` is refused; "" when it is accepted.
 std::string refusedAt(const GltfBuilder& builder, const ImportLimits& limits = {}) {

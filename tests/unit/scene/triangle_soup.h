@@ -8,13 +8,13 @@
 
 #include "server/geometry/bvh.h"
 
-namespace radiosity::test {
+namespace radiosity::scene::test {
 
 /// Around the middle of the unit box; the same for the same seed.
-inline std::vector<scene::Bvh::Triangle> triangleSoup(std::size_t count, std::uint32_t seed) {
+inline std::vector<Bvh::Triangle> triangleSoup(std::size_t count, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> uniform(-0.5F, 0.5F);
-  std::vector<scene::Bvh::Triangle> triangles(count);
+  std::vector<Bvh::Triangle> triangles(count);
   for (auto& t : triangles) {
     const glm::vec3 centre(uniform(random), uniform(random), uniform(random));
     for (auto& p : t) p = centre + 0.2F * glm::vec3(uniform(random), uniform(random), uniform(random));
@@ -22,4 +22,4 @@ inline std::vector<scene::Bvh::Triangle> triangleSoup(std::size_t count, std::ui
   return triangles;
 }
 
-}  // namespace radiosity::test
+}  // namespace radiosity::scene::test

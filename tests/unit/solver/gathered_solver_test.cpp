@@ -20,11 +20,11 @@ using test::kGrey;
 using test::makeQuadScene;
 using test::Quad;
 using test::RayTransport;
-using test::solve;
 
-struct Solve {
-  explicit Solve(const std::vector<Quad>& quads, double target = 0.02, std::size_t memory = std::size_t{1} << 30,
-                 std::uint32_t rays_a_shot = 256, std::uint64_t seed = 1)
+struct GatheredSolve {
+  explicit GatheredSolve(const std::vector<Quad>& quads, double target = 0.02,
+                         std::size_t memory = std::size_t{1} << 30, std::uint32_t rays_a_shot = 256,
+                         std::uint64_t seed = 1)
       : made(makeQuadScene(quads)), rays(rays_a_shot) {
     settings.target_error = target;
     settings.link_memory = memory;
@@ -51,7 +51,7 @@ struct Solve {
 
 // A wave may take as long as all before it.
 TEST(GatheredSolver, ATargetThatIsRaisedEndsAWaveThatNobodyNeeds) {
-  Solve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 0.001);
+  GatheredSolve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 0.001);
   room.rays.pause = std::chrono::milliseconds(5);  // so that a wave takes several slices
   auto isInWave = [&, before = std::uint64_t{0}](StepOutcome outcome) mutable {
     const auto samples = room.solver->linkCounters().samples;
@@ -72,7 +72,7 @@ TEST(GatheredSolver, ATargetThatIsRaisedEndsAWaveThatNobodyNeeds) {
 
 TEST(GatheredSolver, WhereverItWasSavedTheEndIsTheSame) {
   const auto quads = cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey);
-  Solve whole(quads, 0.02), other(quads, 0.02);
+  GatheredSolve whole(quads, 0.02), other(quads, 0.02);
   whole.run();
   int times = 0;
   for (int i = 0; i < 100'000; ++i) {
@@ -97,7 +97,7 @@ TEST(GatheredSolver, WhereverItWasSavedTheEndIsTheSame) {
 
 TEST(GatheredSolver, EditsOfLightAndBackGiveTheSameBits) {
   auto quads = cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey);
-  Solve room(quads, 0.02);
+  GatheredSolve room(quads, 0.02);
   room.run();
   const auto before = room.solver->irradiance();
   quads[1].emission = glm::vec3(9.0F, 1.0F, 0.5F);
@@ -114,7 +114,7 @@ TEST(GatheredSolver, EditsOfLightAndBackGiveTheSameBits) {
 TEST(GatheredSolver, ManyEditsUseUpNoRoundsOfThoseThatFollow) {
   auto quads = cubeQuads(6, {0, 4, 0, 0, 0, 0}, kGrey);
   double target = 0.02;
-  Solve room(quads, target, std::size_t{1} << 30, 64);
+  GatheredSolve room(quads, target, std::size_t{1} << 30, 64);
   room.settings.max_rounds = 30;
   room.solver = room.make();
   ASSERT_EQ(room.run(), StepOutcome::kConverged);
@@ -131,7 +131,7 @@ TEST(GatheredSolver, ManyEditsUseUpNoRoundsOfThoseThatFollow) {
 TEST(GatheredSolver, ScenesWithNothingToGatherEnd) {
   for (const auto& quads : {std::vector<Quad>{}, cubeQuads(4, {}, kGrey), cubeQuads(4, {0, 4, 0, 0, 0, 0}, {}),
                             std::vector<Quad>{cubeQuads(4, {1}, kGrey)[0]}}) {
-    Solve scene(quads);
+    GatheredSolve scene(quads);
     scene.run();
     EXPECT_LE(scene.solver->error().total, 0.02) << quads.size();
     EXPECT_GE(quads.empty() ? 0.0F : scene.darkest(), 0.0F);
@@ -140,7 +140,7 @@ TEST(GatheredSolver, ScenesWithNothingToGatherEnd) {
 
 // Samples of links do not lower what rays leave: a round after the other of them, each with little, never ended.
 TEST(GatheredSolver, WithoutMemoryForTheRaysThatTheTargetTakesEnds) {
-  Solve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 1e-3, 2'000'000, 64);
+  GatheredSolve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 1e-3, 2'000'000, 64);
   EXPECT_EQ(room.run(), StepOutcome::kExhausted);
   EXPECT_EQ(room.solver->limit(), SolveLimit::kLinkMemory);
   EXPECT_LT(room.solver->rounds(), 200U);
@@ -156,13 +156,13 @@ double sum(const LinkedSolver& solver) {
 /// One allocation fails, and the solver is asked to go on.
 TEST(GatheredSolver, ThatRanOutOfMemoryOnceGoesOnToTheSameEnd) {
   const auto quads = cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey);
-  Solve whole(quads, 0.02);
+  GatheredSolve whole(quads, 0.02);
   test::failAllocation(0, 64, test::Shortage::kOnce);
   whole.run();
   const auto allocations = test::letAllocate();
   int failed = 0;
   for (std::size_t number = 1; number < allocations; number += std::max<std::size_t>(1, allocations / 80)) {
-    Solve short_of(quads, 0.02);
+    GatheredSolve short_of(quads, 0.02);
     bool ended = false, failed_now = false;
     test::failAllocation(number, 64, test::Shortage::kOnce);
     for (int i = 0; i < 10'000 && !ended; ++i) {

@@ -53,8 +53,8 @@ struct LampRoom {
   std::vector<Quad> quads;
 };
 
-struct Solve {
-  explicit Solve(test::QuadScene scene, std::uint64_t seed, double target = kTarget) : made(std::move(scene)) {
+struct LampSolve {
+  explicit LampSolve(test::QuadScene scene, std::uint64_t seed, double target = kTarget) : made(std::move(scene)) {
     settings.target_error = target;
     settings.seed = seed;
     EXPECT_TRUE(rays.setScene(made.patches));
@@ -73,7 +73,7 @@ struct Solve {
     return flux;
   }
   /// Relative RMS over leaves.
-  [[nodiscard]] double awayFrom(const Solve& other) const {
+  [[nodiscard]] double awayFrom(const LampSolve& other) const {
     double square = 0.0, difference = 0.0;
     const auto here = solver->irradiance(), there = other.solver->irradiance();
     for (const auto& side : makeSides(*made.patches)) {
@@ -100,7 +100,7 @@ TEST(MissedLamp, InASceneThatOneCanSeeThroughAllItsLightArrives) {
     LampRoom room(width, emission);
     room.addPane();
     for (const std::uint64_t seed : {1U, 2U, 3U}) {
-      const Solve solve(room.make(), seed);
+      const LampSolve solve(room.make(), seed);
       EXPECT_EQ(solve.outcome, StepOutcome::kConverged) << width;
       // Nothing leaves, and half of what arrives is kept: 1 / (1 - 1/2).
       EXPECT_NEAR(solve.received(), 2.0, 2.0 * kTarget) << width << ", seed " << seed;
@@ -118,7 +118,7 @@ TEST(MissedLamp, ThatIsASheetInABrightRoomIsNoSolveThatIsDone) {
     for (std::size_t face = 0; face < 6; ++face) room.quads[face].reflectance = glm::vec3(reflectance);
     room.addPane();
     const double all = (1.0 + static_cast<double>(ratio)) / (1.0 - static_cast<double>(reflectance));
-    const Solve solve(room.make(true), 1, target);
+    const LampSolve solve(room.make(true), 1, target);
     const double truth = std::abs(solve.received() / all - 1.0);
     // The lamp's own two leaves and the pane, of reflectance 0.5, take up to a tenth of it.
     EXPECT_LT(truth, 1.5 * solve.solver->error().total + 0.1) << reflectance;
@@ -137,7 +137,7 @@ TEST(MissedLamp, ThatIsASheetIsNoSolveThatIsDone) {
     room.addPane();
     const double all = 2.0 * (0.5 + static_cast<double>(ceiling));
     for (const std::uint64_t seed : {1U, 2U, 3U}) {
-      const Solve solve(room.make(true), seed, 0.1);
+      const LampSolve solve(room.make(true), seed, 0.1);
       const double truth = std::abs(solve.received() / all - 1.0);
       EXPECT_LT(truth, 1.5 * std::hypot(solve.solver->error().total, 0.02)) << ceiling << ", seed " << seed;
       if (solve.solver->error().total > 0.1) {
@@ -151,11 +151,11 @@ TEST(MissedLamp, ThatIsSwitchedOnComesOverLinksAsInAFreshSolve) {
   for (const float width : {0.003F, 0.03F}) {
     const LampRoom off(width, 0.0F, 1.0F), on(width, 0.2F / (width * width), 1.0F);
     for (const std::uint64_t seed : {1U, 2U, 3U}) {
-      Solve edited(off.make(), seed);
+      LampSolve edited(off.make(), seed);
       const auto before = edited.solver->irradiance();
       edited.solver->setMaterials(on.make().materials);
       EXPECT_EQ(edited.run(), StepOutcome::kConverged);
-      const Solve fresh(on.make(), seed);
+      const LampSolve fresh(on.make(), seed);
       EXPECT_EQ(fresh.outcome, StepOutcome::kConverged);
       const double stated = std::hypot(edited.solver->error().total, fresh.solver->error().total);
       EXPECT_LT(edited.awayFrom(fresh), 1.5 * stated) << width << ", seed " << seed;
@@ -167,7 +167,7 @@ TEST(MissedLamp, ThatIsSwitchedOnComesOverLinksAsInAFreshSolve) {
 // Where an edit brings more leaves than rays have room for, all of it is shot.
 TEST(MissedLamp, AnEditThatLeavesNoRoomForRaysIsSolvedByShooting) {
   auto quads = cubeQuads(8, {0, 4}, kGrey);
-  Solve room(makeQuadScene(quads), 1, 0.1);
+  LampSolve room(makeQuadScene(quads), 1, 0.1);
   ASSERT_NE(room.solver->gathered(), nullptr);
   for (int i = 0; i < 4; ++i)
     quads.push_back({{-0.4F + 0.2F * static_cast<float>(i), -0.3F, -0.4F}, {0, 0.2F, 0}, {0, 0, 0.2F}, 64, 64, {}, {}});

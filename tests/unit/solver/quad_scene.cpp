@@ -133,6 +133,14 @@ std::vector<Quad> cubeQuads(std::uint32_t leaves, const std::array<float, 6>& em
   return quads;
 }
 
+std::vector<Quad> openCube(std::size_t missing, float reflectance) {
+  std::array<float, 6> all{};
+  all.fill(reflectance);
+  auto quads = cubeQuads(6, kDark, all);
+  quads.erase(quads.begin() + static_cast<std::ptrdiff_t>(missing));
+  return quads;
+}
+
 Result<void> RayTransport::setScene(std::shared_ptr<const scene::PatchScene> patches) {
   patches_ = std::move(patches);
   return {};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -33,6 +34,10 @@ inline constexpr std::array<float, 6> kDark{}, kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5
 /// The six inward faces of a cube of side 1 around the origin, each with `emission[i]`, `reflectance[i]`.
 [[nodiscard]] std::vector<Quad> cubeQuads(std::uint32_t leaves, const std::array<float, 6>& emission,
                                           const std::array<float, 6>& reflectance);
+/// cubeQuads() of 6 leaves that do not shine, all of one reflectance, without one of its faces.
+[[nodiscard]] std::vector<Quad> openCube(std::size_t missing, float reflectance);
+/// Form factor from a face of the cube to the one opposite.
+inline constexpr double kOpposite = 0.1998248957;
 
 /// Brute force: `rays` cosine-distributed rays a scatter shot, links to leaves; gathered light at leaf centres from the
 /// light points with Lambert's formula and shadow rays.

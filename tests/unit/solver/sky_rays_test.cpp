@@ -16,12 +16,10 @@ namespace {
 
 using test::cubeQuads;
 using test::kDark;
+using test::kOpposite;
 using test::makeQuadScene;
-using test::Quad;
+using test::openCube;
 using test::RayTransport;
-
-/// From a face of a cube to the one before it.
-constexpr double kOpposite = 0.1998248957;
 
 std::array<float, 6> grey(float reflectance) {
   std::array<float, 6> all{};
@@ -35,8 +33,9 @@ LightSources skyOf(float above, float below) {
   return sources;
 }
 
-struct Solve {
-  explicit Solve(test::QuadScene scene, const LightSources& sources, double target = 0.005) : made(std::move(scene)) {
+struct SkySolve {
+  explicit SkySolve(test::QuadScene scene, const LightSources& sources, double target = 0.005)
+      : made(std::move(scene)) {
     settings.target_error = target;
     EXPECT_TRUE(rays.setScene(made.patches));
     solver = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings, sources);
@@ -51,15 +50,9 @@ struct Solve {
   StepOutcome outcome = StepOutcome::kSlice;
 };
 
-std::vector<Quad> openCube(std::size_t missing, float reflectance) {
-  auto quads = cubeQuads(6, kDark, grey(reflectance));
-  quads.erase(quads.begin() + static_cast<std::ptrdiff_t>(missing));
-  return quads;
-}
-
 TEST(SkyRays, OfTheRightHalfComeThroughAnOpening) {
   const double whole = std::numbers::pi * kOpposite;
-  const Solve lid(makeQuadScene(openCube(1, 0.0F)), skyOf(1.0F, 50.0F)),
+  const SkySolve lid(makeQuadScene(openCube(1, 0.0F)), skyOf(1.0F, 50.0F)),
       floor(makeQuadScene(openCube(0, 0.0F)), skyOf(50.0F, 2.0F));
   EXPECT_EQ(lid.outcome, StepOutcome::kConverged);
   EXPECT_NEAR(lid.mean(0), whole, 0.005 * whole);
@@ -75,7 +68,7 @@ TEST(SkyRays, OfTheRightHalfComeThroughAnOpening) {
 TEST(SkyRays, BringWhatShotsBring) {
   const auto made = makeQuadScene(openCube(5, 0.7F));
   const auto sky = skyOf(1.0F, 0.3F);
-  const Solve rays(made, sky);
+  const SkySolve rays(made, sky);
   ASSERT_EQ(rays.outcome, StepOutcome::kConverged);
   SolverSettings settings;
   settings.target_error = 0.02;
@@ -99,7 +92,7 @@ TEST(SkyRays, BringWhatShotsBring) {
 }
 
 TEST(SkyRays, AnotherSkyAndBackGivesTheSameBits) {
-  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
+  SkySolve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
   const auto before = room.solver->irradiance();
   const auto rays = room.solver->linkCounters().rays;
   room.solver->setLights(skyOf(3.0F, 0.0F));
@@ -117,16 +110,16 @@ TEST(SkyRays, AnotherSkyAndBackGivesTheSameBits) {
 }
 
 TEST(SkyRays, ASkyThatComesToADarkSceneLightsIt) {
-  Solve room(makeQuadScene(openCube(1, 0.5F)), {});
+  SkySolve room(makeQuadScene(openCube(1, 0.5F)), {});
   EXPECT_EQ(room.solver->error().total, 0.0);
   room.solver->setLights(skyOf(1.0F, 0.0F));
   EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
-  const Solve fresh(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
+  const SkySolve fresh(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
   EXPECT_NEAR(room.mean(0), fresh.mean(0), 0.01 * fresh.mean(0));
 }
 
 TEST(SkyRays, WhatWasSavedGoesOnToTheSameEnd) {
-  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.5F));
+  SkySolve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.5F));
   ArchiveWriter to(std::size_t{64} << 20);
   ASSERT_TRUE(room.solver->save(to));
   LinkedSolver next(room.made.patches, room.made.materials, room.rays, room.settings, skyOf(1.0F, 0.5F));
@@ -159,7 +152,7 @@ test::QuadScene partedCube(bool is_cut, float reflectance = 0.9F, float thicknes
 }
 
 TEST(CutLeaves, LetNoLightThroughAWall) {
-  const Solve blind(partedCube(false), skyOf(1.0F, 1.0F)), room(partedCube(true), skyOf(1.0F, 1.0F));
+  const SkySolve blind(partedCube(false), skyOf(1.0F, 1.0F)), room(partedCube(true), skyOf(1.0F, 1.0F));
   constexpr std::size_t kRight = 4, kWallRight = 5, kWallLeft = 6;
   ASSERT_GT(blind.mean(kRight), 0.05 * blind.mean(kWallLeft)) << "through the middle of the floor";
   for (const auto surface : {kRight, kWallRight}) EXPECT_NEAR(room.mean(surface), 0.0, 1e-5) << surface;
@@ -170,7 +163,7 @@ TEST(CutLeaves, LetNoLightThroughAWall) {
 
 // The middle leaves lie in part inside the wall, and nothing says so but what their rays see.
 TEST(PartlyInside, LetNoLightThroughAWall) {
-  const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F));
+  const SkySolve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F));
   constexpr std::size_t kRight = 4, kWallRight = 5, kWallLeft = 6;
   for (const auto surface : {kRight, kWallRight}) EXPECT_NEAR(room.mean(surface), 0.0, 1e-5) << surface;
   EXPECT_GT(room.mean(kWallLeft), 0.5 * std::numbers::pi);
@@ -182,7 +175,7 @@ TEST(PartlyInside, LetNoLightThroughAWall) {
 TEST(CutLeaves, WithoutEndAreStatedAsDoubtful) {
   auto made = partedCube(true, 0.999F);
   for (auto& leaf : made.patches->leaves) leaf.cut = true;
-  const Solve room(std::move(made), skyOf(1.0F, 1.0F));
+  const SkySolve room(std::move(made), skyOf(1.0F, 1.0F));
   const auto& right = room.made.patches->surfaces[4];
   const auto squares = room.solver->commonErrorSquared();
   const auto light = room.solver->irradiance();
@@ -282,7 +275,7 @@ TEST(CutLeaves, AreInDoubtOfLightThatChangesFromLeafToLeaf) {
 
 // Which leaves lie in part inside of something rays alone tell, and they are traced anew when they are needed.
 TEST(PartlyInside, AreSavedWithAllElse) {
-  const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), 0.02);
+  const SkySolve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), 0.02);
   ArchiveWriter to(std::size_t{64} << 20);
   ASSERT_TRUE(room.solver->save(to));
   auto transport = room.rays;

@@ -12,16 +12,16 @@
 #include "server/state/path_claim.h"
 #include "server/state/store.h"
 #include "tests/unit/client/temporary_folder.h"
+#include "tests/unit/state/bytes_of.h"
 
 namespace radiosity::state {
 namespace {
 
 namespace fs = std::filesystem;
+using test::bytesOf;
 using ::testing::HasSubstr;
 
-SharedBytes bytesOf(const std::string& text) { return std::make_shared<const Bytes>(text.begin(), text.end()); }
-
-Store::Change change(std::uint64_t revision) {
+Store::Change answeredChange(std::uint64_t revision) {
   Store::Change made{{revision, 1, "ann", "replace /a", 13.25, 0, "[]", {1, 0, {}, {}}}, {}, {}, 0, {}, {}};
   made.answer = Answer{"id-" + std::to_string(revision), 7, revision, 0, 0, 0};
   return made;
@@ -43,7 +43,8 @@ class Moved : public testing::Test {
   /// Nothing can be kept, and every refusal names `where`.
   void expectRefused(const std::string& where) {
     const auto upload = bytesOf("upload");
-    const Result<void> refusals[] = {store_->check(), store_->edit(change(2)), store_->setSettings({{"seed", "5"}}),
+    const Result<void> refusals[] = {store_->check(), store_->edit(answeredChange(2)),
+                                     store_->setSettings({{"seed", "5"}}),
                                      store_->keepUpload({sha256Hex(*upload), "u"}, upload, {})};
     for (const auto& refused : refusals) {
       ASSERT_FALSE(refused);
@@ -70,7 +71,7 @@ TEST_F(Moved, AFolderThatWasMovedAwayKeepsNothingUntilItIsBack) {
   expectRefused(state_ / "lock");
   fs::rename(away_, state_);
   EXPECT_TRUE(store_->check());
-  const auto kept = store_->edit(change(2));
+  const auto kept = store_->edit(answeredChange(2));
   ASSERT_TRUE(kept) << kept.error().text();
   expectKept(2);
 }
@@ -103,7 +104,7 @@ TEST_F(Moved, AnotherStoreAtThePathIsLeftAlone) {
   expectRefused(state_ / "lock");
   store_.reset();
   ASSERT_TRUE(other->check()) << other->check().error().text();
-  ASSERT_TRUE(other->edit(change(2)));
+  ASSERT_TRUE(other->edit(answeredChange(2)));
   other.reset();
   expectKept(2);
   store_.reset();

@@ -9,12 +9,13 @@
 #include "common/sha256.h"
 #include "server/state/checkpoint.h"
 #include "tests/unit/client/temporary_folder.h"
+#include "tests/unit/state/bytes_of.h"
 #include "tests/unit/state/file_limit.h"
 
 namespace radiosity::state {
 namespace {
 
-SharedBytes bytesOf(const std::string& text) { return std::make_shared<const Bytes>(text.begin(), text.end()); }
+using test::bytesOf;
 
 Revision loadEntry(std::uint64_t revision) { return {revision, 0, "", "room.glb", 12.5, 0, "", {}}; }
 Document room(const std::string& gltf = R"({"a":1})") {
@@ -22,7 +23,7 @@ Document room(const std::string& gltf = R"({"a":1})") {
 }
 
 /// An edit that leads from one revision to the next.
-Store::Change change(std::uint64_t revision, const std::string& patch = "[]") {
+Store::Change editOf(std::uint64_t revision, const std::string& patch = "[]") {
   Store::Change made{{revision, 1, "ann", "replace /a", 13.25, 0, patch, {1, 1, {}, {}}}, {}, {}, 0, {}, {}};
   made.edit = Edit{revision, patch, "[1]", {1, 1, {}, {}}};
   made.edits_done = 1;
@@ -45,7 +46,7 @@ class StoreTest : public testing::Test {
   void fill(std::uint64_t last) {
     auto store = open();
     ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
-    for (std::uint64_t r = 2; r <= last; ++r) ASSERT_TRUE(store->edit(change(r)));
+    for (std::uint64_t r = 2; r <= last; ++r) ASSERT_TRUE(store->edit(editOf(r)));
   }
   void flip(const std::string& name, std::size_t place) {
     auto text = folder_.read(name);
@@ -81,7 +82,7 @@ TEST_F(StoreTest, EverythingComesBack) {
   {
     auto store = open();
     ASSERT_TRUE(store->load(loadEntry(7), room(), "digest"));
-    auto edit = change(8, R"([{"op":"replace","path":"/a","value":2}])");
+    auto edit = editOf(8, R"([{"op":"replace","path":"/a","value":2}])");
     edit.revision.appended = edit.edit->appended = {1, 1, {bytesOf("more")}, {}};
     edit.answer = Answer{"id-1", ~std::uint64_t{0}, 8, 3, 4, 0};
     ASSERT_TRUE(store->edit(edit));
@@ -118,10 +119,10 @@ TEST_F(StoreTest, ForgottenEditsAndDroppedUploadsAreGoneAndSoAreTheirBytes) {
   {
     auto store = open();
     ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
-    auto edit = change(2);
+    auto edit = editOf(2);
     edit.revision.appended = edit.edit->appended = {1, 1, {bytesOf("more")}, {}};
     ASSERT_TRUE(store->edit(edit));
-    auto next = change(3);
+    auto next = editOf(3);
     next.forgotten = {2};
     ASSERT_TRUE(store->edit(next));
     const Upload first{sha256Hex(std::string_view("one")), "one"}, second{sha256Hex(std::string_view("two")), "two"};
@@ -170,7 +171,7 @@ TEST_F(StoreTest, WhatForgottenEditsHadAppendedDoesNotAddUp) {
   auto store = open();
   ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
   for (std::uint64_t r = 2; r <= kEdits; ++r) {
-    auto edit = change(r);
+    auto edit = editOf(r);
     edit.revision.appended = edit.edit->appended = {1, 1, {bytesOf("appended by " + std::to_string(r))}, {}};
     edit.forgotten = {r - 1};
     if (store->wantsDocument()) edit.document = room();
@@ -186,7 +187,7 @@ TEST_F(StoreTest, LongHistoriesAreBoundedOnceTheDocumentIsWrittenWhole) {
     auto store = open();
     ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
     for (std::uint64_t r = 2; r <= 1400; ++r) {
-      auto edit = change(r);
+      auto edit = editOf(r);
       edit.forgotten = {r - 1};
       edit.answer = Answer{"id-" + std::to_string(r), r, r, 0, 0, 0};
       if (store->wantsDocument()) edit.document = room("{\"r\":" + std::to_string(r) + "}");
@@ -278,7 +279,7 @@ TEST_F(StoreTest, ACutOrFlippedLogIsNoticed) {
   {
     auto store = open();
     ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
-    for (std::uint64_t r = 2; r <= 9; ++r) ASSERT_TRUE(store->edit(change(r)));
+    for (std::uint64_t r = 2; r <= 9; ++r) ASSERT_TRUE(store->edit(editOf(r)));
     // As a killed server would leave it: the log is not in the file yet.
     std::filesystem::copy(folder_.file("state"), copy.file("state"), std::filesystem::copy_options::recursive);
   }
@@ -352,13 +353,13 @@ TEST_F(StoreTest, WhatDoesNotFitOnTheDiskIsRefusedAndTheRestStays) {
     ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
     {
       const test::FileLimit full(std::filesystem::file_size(folder_.file("state/state.sqlite-wal")));
-      const auto refused = store->edit(change(2, std::string(100000, ' ')));
+      const auto refused = store->edit(editOf(2, std::string(100000, ' ')));
       ASSERT_FALSE(refused);
       EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
       EXPECT_EQ(refused.error().where, folder_.file("state/state.sqlite"));
       EXPECT_NE(refused.error().message.find("File too large"), std::string::npos) << refused.error().message;
     }
-    ASSERT_TRUE(store->edit(change(2, "[3]")));  // there is room again
+    ASSERT_TRUE(store->edit(editOf(2, "[3]")));  // there is room again
     {
       const test::FileLimit full(1000);
       const std::string big(100000, 'b');

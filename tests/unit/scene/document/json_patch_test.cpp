@@ -339,7 +339,7 @@ TEST_F(ScenePatch, aChainOfEditsImportsAsEachDocumentWouldByItself) {
 }
 
 /// PNG of 2 x 1 pixels: red, then blue.
-constexpr std::array<std::uint8_t, 72> kRedAndBlue = {
+constexpr std::array<std::uint8_t, 72> kRedAndBluePng = {
     0x89, 0x50, 0x4E, 0x47, 0x0D, 0x0A, 0x1A, 0x0A, 0x00, 0x00, 0x00, 0x0D, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
     0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x08, 0x02, 0x00, 0x00, 0x00, 0x7B, 0x40, 0xE8, 0xDD, 0x00, 0x00, 0x00,
     0x0F, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9C, 0x63, 0xF8, 0xCF, 0xC0, 0xC0, 0xC0, 0xF0, 0x1F, 0x00, 0x07, 0x00,
@@ -349,7 +349,7 @@ constexpr std::array<std::uint8_t, 72> kRedAndBlue = {
 TEST_F(ScenePatch, whatAnEditLeavesAloneIsSharedWithTheSceneBefore) {
   auto textured = document_;
   textured.gltf["images"] = Json::array({{{"mimeType", "image/png"}}});
-  textured.images = {std::make_shared<const Bytes>(kRedAndBlue.begin(), kRedAndBlue.end())};
+  textured.images = {std::make_shared<const Bytes>(kRedAndBluePng.begin(), kRedAndBluePng.end())};
   textured.gltf["textures"] = Json::array({{{"source", 0}}});
   auto& surface = textured.gltf["materials"][0]["pbrMetallicRoughness"];
   surface["baseColorTexture"] = surface["metallicRoughnessTexture"] = {{"index", 0}};

@@ -10,12 +10,14 @@
 
 #include "tests/unit/scene/expect_refused.h"
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
 using test::expectRefused;
 using test::GltfBuilder;
+using test::imported;
 using testing::Contains;
 using testing::HasSubstr;
 using Json = nlohmann::json;
@@ -26,12 +28,6 @@ constexpr const char* kIesData =
     "data:application/"
     "x-ies-lm-63,IESNA%3ALM-63-2002%0ATILT%3DNONE%0A1%20-1%201%203%202%201%202%200%200%200%201%201%2010"
     "%0A0%2045%2090%0A0%20180%0A100%2080%200%0A100%2060%200%0A";
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
-}
 
 GltfBuilder withArea(const Json& light, Json node = Json::object()) {
   GltfBuilder builder;

@@ -5,22 +5,18 @@
 #include "server/scene/document/png.h"
 #include "server/scene/lightmap/lightmap.h"
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
 using test::dataUri;
 using test::GltfBuilder;
+using test::imported;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using Json = nlohmann::json;
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
-}
 
 TEST(ImportMaterial, materialsCarryWhatLightNeeds) {
   GltfBuilder builder;

@@ -7,11 +7,13 @@
 #include <limits>
 
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
 using test::GltfBuilder;
+using test::imported;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -26,12 +28,6 @@ GltfBuilder squareWith(const std::vector<float>& normals) {
   builder.gltf["meshes"][mesh]["primitives"][0]["attributes"]["NORMAL"] = builder.vec3(normals);
   builder.node({{"mesh", mesh}});
   return builder;
-}
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
 }
 
 TEST(ImportNormals, areGivenToUnitLength) {

@@ -33,15 +33,15 @@ std::vector<MeasuringPlane> planesOf(const GltfBuilder& builder) {
   return scene ? *readPlanes(*builder.document()) : std::vector<MeasuringPlane>();
 }
 
-MeasuringPlane imported(const GltfBuilder& builder) {
+MeasuringPlane importedPlane(const GltfBuilder& builder) {
   const auto planes = planesOf(builder);
   EXPECT_EQ(planes.size(), 1U);
   return planes.empty() ? MeasuringPlane{} : planes.front();
 }
 
 TEST(MeasuringPlanes, LieInTheXZPlaneOfTheirNodeAndLookAlongY) {
-  const auto plane = imported(withPlane({{"width", 2.0}, {"depth", 3.0}, {"columns", 4}, {"rows", 2}},
-                                        {{"name", "desk"}, {"translation", {1, 0.75, 2}}}));
+  const auto plane = importedPlane(withPlane({{"width", 2.0}, {"depth", 3.0}, {"columns", 4}, {"rows", 2}},
+                                             {{"name", "desk"}, {"translation", {1, 0.75, 2}}}));
   EXPECT_EQ(plane.name, "desk");
   EXPECT_EQ(plane.normal, glm::dvec3(0, 1, 0));
   EXPECT_EQ(plane.pointAt(0, 0), glm::dvec3(0.25, 0.75, 1.25));
@@ -50,15 +50,15 @@ TEST(MeasuringPlanes, LieInTheXZPlaneOfTheirNodeAndLookAlongY) {
 
 TEST(MeasuringPlanes, AreTurnedMirroredAndScaledWithTheirNode) {
   const double half = std::sqrt(0.5);
-  const auto plane = imported(withPlane({{"width", 2.0}, {"depth", 3.0}, {"columns", 1}, {"rows", 1}},
-                                        {{"rotation", {half, 0, 0, half}}, {"scale", {-2, 1, 1}}}));
+  const auto plane = importedPlane(withPlane({{"width", 2.0}, {"depth", 3.0}, {"columns", 1}, {"rows", 1}},
+                                             {{"rotation", {half, 0, 0, half}}, {"scale", {-2, 1, 1}}}));
   EXPECT_NEAR(glm::length(plane.across), 4.0, 1e-12);
   EXPECT_NEAR(glm::distance(plane.normal, glm::dvec3(0, 0, 1)), 0.0, 1e-12) << "+y was turned there, mirrored or not";
 }
 
 TEST(MeasuringPlanes, AMarginIsTakenFromAllSides) {
   const auto plane =
-      imported(withPlane({{"width", 5.0}, {"depth", 4.0}, {"margin", 0.5}, {"columns", 1}, {"rows", 1}}));
+      importedPlane(withPlane({{"width", 5.0}, {"depth", 4.0}, {"margin", 0.5}, {"columns", 1}, {"rows", 1}}));
   EXPECT_EQ(plane.across, glm::dvec3(4, 0, 0));
   EXPECT_EQ(plane.down, glm::dvec3(0, 0, 3));
   EXPECT_EQ(plane.pointAt(0, 0), glm::dvec3(0.0));
@@ -91,7 +91,7 @@ TEST(MeasuringPlanes, OfHiddenNodesAreLeftOut) {
 }
 
 TEST(MeasuringPlanes, ATargetMayNameOneOfBoth) {
-  const auto plane = imported(withPlane({{"width", 2.0}, {"depth", 3.0}, {"target", {{"uniformity", 0.6}}}}));
+  const auto plane = importedPlane(withPlane({{"width", 2.0}, {"depth", 3.0}, {"target", {{"uniformity", 0.6}}}}));
   EXPECT_EQ(plane.target.uniformity, 0.6);
   EXPECT_FALSE(plane.target.lux);
 }

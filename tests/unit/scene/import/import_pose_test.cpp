@@ -7,22 +7,17 @@
 
 #include "server/scene/lightmap/lightmap.h"
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
 using test::GltfBuilder;
+using test::imported;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using Json = nlohmann::json;
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
-}
 
 std::string refusedAt(const GltfBuilder& builder) {
   const auto scene = builder.scene();

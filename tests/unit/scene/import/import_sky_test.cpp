@@ -12,29 +12,24 @@
 #include "server/scene/values/daylight.h"
 #include "tests/unit/scene/expect_refused.h"
 #include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/imported.h"
 
 namespace radiosity::scene {
 namespace {
 
+using std::numbers::pi;
 using test::dataUri;
 using test::expectRefused;
 using test::GltfBuilder;
+using test::imported;
 using test::Json;
 using testing::HasSubstr;
-
-constexpr double kPi = std::numbers::pi;
 
 GltfBuilder withSky(const Json& sky) {
   GltfBuilder builder;
   builder.node({{"mesh", builder.square()}});
   if (!sky.is_null()) builder.gltf["extras"]["radiositySky"] = sky;
   return builder;
-}
-
-Scene imported(const GltfBuilder& builder) {
-  auto scene = builder.scene();
-  EXPECT_TRUE(scene) << scene.error().text();
-  return scene ? std::move(*scene) : Scene{};
 }
 
 /// Two columns, one row: 1 towards -Z and 2 towards +Z.
@@ -73,7 +68,7 @@ TEST(ImportSky, PicturesBecomeABufferView) {
   ASSERT_TRUE(sky && sky->picture);
   EXPECT_EQ(saved->sky, sky);
   EXPECT_EQ(sky->strength, 3.0F);
-  EXPECT_DOUBLE_EQ(sky->turn_rad, 0.5 * kPi);
+  EXPECT_DOUBLE_EQ(sky->turn_rad, 0.5 * pi);
   EXPECT_EQ(sky->upper, glm::vec3(1.0F));
   EXPECT_EQ(sky->picture->image().texels[1], glm::vec3(2.0F));
 }
@@ -115,15 +110,15 @@ TEST(ImportSky, DaylightIsASkyAndASun) {
                         {"rotation", 90}}))
           .sky;
   ASSERT_TRUE(sky && sky->picture && sky->sun);
-  EXPECT_NEAR(sky->sun->diameter_rad, kSunDegrees * kPi / 180.0, 1e-9);
-  EXPECT_NEAR(std::asin(sky->sun->direction.y) * 180.0 / kPi, 61.0, 1.5) << "an hour before it is highest";
+  EXPECT_NEAR(sky->sun->diameter_rad, kSunDegrees * pi / 180.0, 1e-9);
+  EXPECT_NEAR(std::asin(sky->sun->direction.y) * 180.0 / pi, 61.0, 1.5) << "an hour before it is highest";
   EXPECT_NEAR(sky->sun->direction.x, 0.38, 0.03) << "what it had towards the south is towards the east";
   EXPECT_NEAR(static_cast<double>(sky->sun->illuminance.x), 90'000.0, 15'000.0);
   const auto cie = imported(withSky({{"daylight", {{"sky", "overcast"}, {"diffuse", 1000}, {"ground", 0.5}}}})).sky;
   ASSERT_TRUE(cie && cie->picture);
   EXPECT_FALSE(cie->sun);
-  EXPECT_NEAR(static_cast<double>(cie->picture->image().texels[0].x), 1000.0 * 9.0 / 7.0 / kPi, 0.5);
-  EXPECT_NEAR(static_cast<double>(cie->picture->image().texels.back().x), 500.0 / kPi, 0.01);
+  EXPECT_NEAR(static_cast<double>(cie->picture->image().texels[0].x), 1000.0 * 9.0 / 7.0 / pi, 0.5);
+  EXPECT_NEAR(static_cast<double>(cie->picture->image().texels.back().x), 500.0 / pi, 0.01);
   const auto night = imported(withSky({{"daylight", {{"altitude", -5}}}}));
   ASSERT_TRUE(night.sky);
   EXPECT_FALSE(night.sky->sun);
@@ -255,7 +250,7 @@ TEST(ImportEnvironment, ReadsACubeOfKtx) {
   expectRefused(builder, ErrorCode::kUnsupported, "/extensions/KHR_environment_map/cubemaps/0", "format (145)");
   // Irradiance under 1 nit is pi: all of it is in the first coefficient, times 2 sqrt(pi). The cubemap doubles it.
   Json coefficients = Json::array();
-  for (int i = 0; i < 9; ++i) coefficients.push_back({i == 0 ? kPi * 2.0 * std::sqrt(kPi) : 0.0, 0, 0});
+  for (int i = 0; i < 9; ++i) coefficients.push_back({i == 0 ? pi * 2.0 * std::sqrt(pi) : 0.0, 0, 0});
   builder.gltf["extensions"]["KHR_environment_map"]["environment_maps"][0]["irradianceCoefficients"] = coefficients;
   const auto even = imported(builder);
   EXPECT_NEAR(even.sky->picture->image().texels[100].x, 2.0F, 1e-3F);
@@ -304,7 +299,7 @@ TEST(ImportLights, ADirectionalLightMayHaveAnAngle) {
   builder.node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
   const auto scene = imported(builder);
   ASSERT_EQ(scene.lights.size(), 1U);
-  EXPECT_NEAR(scene.lights[0].half.x, 0.25 * kPi / 180.0, 1e-12);
+  EXPECT_NEAR(scene.lights[0].half.x, 0.25 * pi / 180.0, 1e-12);
   builder.gltf["extensions"]["KHR_lights_punctual"]["lights"][0]["extras"]["radiosityAngle"] = 120;
   expectRefused(builder, ErrorCode::kInvalidScene, "/extensions/KHR_lights_punctual/lights/0/extras/radiosityAngle",
                 "degrees");

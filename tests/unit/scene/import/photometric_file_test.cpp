@@ -12,9 +12,8 @@
 namespace radiosity::scene {
 namespace {
 
+using std::numbers::pi;
 using testing::HasSubstr;
-
-constexpr double kPi = std::numbers::pi;
 
 Result<PhotometricFile> parse(const std::string& text) {
   return parsePhotometricFile({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "lamp.ies");
@@ -26,7 +25,7 @@ PhotometricFile parsed(const std::string& text) {
   return file ? std::move(*file) : PhotometricFile{};
 }
 
-std::string refusal(const std::string& text) {
+std::string photometricRefusal(const std::string& text) {
   const auto file = parse(text);
   EXPECT_FALSE(file);
   return file ? "" : file.error().text();
@@ -77,14 +76,14 @@ TEST(Ies, TheLumensOfAWebAreItsIntegral) {
   Ies ies;
   ies.vertical = {0, 180};
   ies.candela = {5, 5};
-  EXPECT_NEAR(parsed(ies.text()).web.lumens, 20.0 * kPi, 1e-5);
+  EXPECT_NEAR(parsed(ies.text()).web.lumens, 20.0 * pi, 1e-5);
   ies.vertical.clear();
   ies.candela.clear();
   ies.horizontal = {0, 90, 180, 270, 360};
   for (int i = 0; i <= 90; ++i) ies.vertical.push_back(i);
   for (int h = 0; h < 5; ++h)
-    for (int i = 0; i <= 90; ++i) ies.candela.push_back(1000.0 * std::cos(i * kPi / 180.0));
-  EXPECT_NEAR(parsed(ies.text()).web.lumens, 1000.0 * kPi, 0.2);
+    for (int i = 0; i <= 90; ++i) ies.candela.push_back(1000.0 * std::cos(i * pi / 180.0));
+  EXPECT_NEAR(parsed(ies.text()).web.lumens, 1000.0 * pi, 0.2);
 }
 
 TEST(Ies, QuadrantsAndHalvesAreWrittenOut) {
@@ -152,7 +151,7 @@ TEST(Ies, TypesAAndBThatEndBefore90AreDarkBeyond) {
   EXPECT_FLOAT_EQ(at(file, 59, 0), 0);
   EXPECT_FLOAT_EQ(at(file, 90, 41), 0);
   ies.vertical = {10, 20, 30};
-  EXPECT_THAT(refusal(ies.text()), HasSubstr("must begin at 0 or below and end above 0"));
+  EXPECT_THAT(photometricRefusal(ies.text()), HasSubstr("must begin at 0 or below and end above 0"));
 }
 
 TEST(Ies, MultiplierAndBallastCountAndTheSecondFactorOnlyBefore2002) {
@@ -205,30 +204,37 @@ TEST(Ies, WhatIsWrongIsNamedByItsLine) {
     change(ies);
     return ies.text();
   };
-  EXPECT_THAT(refusal(with([](Ies& i) {
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) {
                 i.vertical = {0, 90, 45};
               })),
               HasSubstr("line 7: vertical angles must ascend"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.candela = {1, -2, 3}; })), HasSubstr("line 9: candela is out of range"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.horizontal = {0, 70}; })), HasSubstr("horizontal angles must go from 0"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.vertical = {0, 200}; })), HasSubstr("out of range"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.multiplier = "nan"; })), HasSubstr("line 5: candela multiplier"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.multiplier = "1e999"; })), HasSubstr("candela multiplier"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.multiplier = "0"; })), HasSubstr("out of range"));
-  EXPECT_THAT(refusal(with([](Ies& i) { i.type = 4; })), HasSubstr("photometric type is out of range"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) {
+                i.candela = {1, -2, 3};
+              })),
+              HasSubstr("line 9: candela is out of range"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) {
+                i.horizontal = {0, 70};
+              })),
+              HasSubstr("horizontal angles must go from 0"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) { i.vertical = {0, 200}; })), HasSubstr("out of range"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) { i.multiplier = "nan"; })), HasSubstr("line 5: candela multiplier"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) { i.multiplier = "1e999"; })), HasSubstr("candela multiplier"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) { i.multiplier = "0"; })), HasSubstr("out of range"));
+  EXPECT_THAT(photometricRefusal(with([](Ies& i) { i.type = 4; })), HasSubstr("photometric type is out of range"));
   auto text = Ies().text();
-  EXPECT_THAT(refusal(text.substr(0, text.rfind("101"))), HasSubstr("the file ends before its candela"));
-  EXPECT_THAT(refusal("IESNA:LM-63-2002\n[TEST]\n"), HasSubstr("without a line TILT="));
+  EXPECT_THAT(photometricRefusal(text.substr(0, text.rfind("101"))), HasSubstr("the file ends before its candela"));
+  EXPECT_THAT(photometricRefusal("IESNA:LM-63-2002\n[TEST]\n"), HasSubstr("without a line TILT="));
 }
 
 TEST(Ies, CountsAreBoundedBeforeAnythingIsMade) {
   const auto head = std::string("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 ");
-  EXPECT_THAT(refusal(head + "1000000000 1 1 2 0 0 0 1 1 1\n"), HasSubstr("line 3: number of vertical angles"));
-  EXPECT_THAT(refusal(head + "1000 100000 1 2 0 0 0 1 1 1\n"), HasSubstr("more than 262144 directions"));
-  EXPECT_THAT(refusal(head + "2.5 1 1 2 0 0 0 1 1 1\n"), HasSubstr("whole number"));
-  EXPECT_THAT(refusal(head + "-3 1 1 2 0 0 0 1 1 1\n"), HasSubstr("out of range"));
-  EXPECT_THAT(refusal(std::string("\0\0\0", 3) + "x"), HasSubstr("no text"));
-  EXPECT_THAT(refusal(""), HasSubstr("ends early"));
+  EXPECT_THAT(photometricRefusal(head + "1000000000 1 1 2 0 0 0 1 1 1\n"),
+              HasSubstr("line 3: number of vertical angles"));
+  EXPECT_THAT(photometricRefusal(head + "1000 100000 1 2 0 0 0 1 1 1\n"), HasSubstr("more than 262144 directions"));
+  EXPECT_THAT(photometricRefusal(head + "2.5 1 1 2 0 0 0 1 1 1\n"), HasSubstr("whole number"));
+  EXPECT_THAT(photometricRefusal(head + "-3 1 1 2 0 0 0 1 1 1\n"), HasSubstr("out of range"));
+  EXPECT_THAT(photometricRefusal(std::string("\0\0\0", 3) + "x"), HasSubstr("no text"));
+  EXPECT_THAT(photometricRefusal(""), HasSubstr("ends early"));
 }
 
 TEST(Ies, SymmetriesWrittenOutAreBoundedToo) {
@@ -237,7 +243,7 @@ TEST(Ies, SymmetriesWrittenOutAreBoundedToo) {
   for (int i = 0; i <= 399; ++i) ies.vertical.push_back(180.0 * i / 399.0);
   ies.horizontal.clear();
   for (int i = 0; i <= 599; ++i) ies.horizontal.push_back(90.0 * i / 599.0);
-  EXPECT_THAT(refusal(ies.text()), HasSubstr("symmetries written out, it has more than 262144 directions"));
+  EXPECT_THAT(photometricRefusal(ies.text()), HasSubstr("symmetries written out, it has more than 262144 directions"));
 }
 
 TEST(Ies, ManyAzimuthsTakeTheTimeOfAsManyCandela) {
@@ -253,7 +259,7 @@ TEST(Ies, ManyAzimuthsTakeTheTimeOfAsManyCandela) {
 TEST(Ies, AnglesThatAreTheSameDoNotAscend) {
   Ies ies;
   ies.vertical = {0, 45, 45.0005, 90};
-  EXPECT_THAT(refusal(ies.text()), HasSubstr("vertical angles must ascend"));
+  EXPECT_THAT(photometricRefusal(ies.text()), HasSubstr("vertical angles must ascend"));
 }
 
 /// A EULUMDAT file whose web is 1000 cos in cd / klm.
@@ -269,7 +275,7 @@ std::string eulumdat(int symmetry, int planes, double ratio = 100.0 * std::numbe
   for (int p = 0; p < told; ++p) {
     for (int i = 0; i < 19; ++i) {
       std::ostringstream number;
-      number << 1000.0 * std::cos(5 * i * kPi / 180.0) + (i == 9 && p == 0 ? 100.0 : 0.0);
+      number << 1000.0 * std::cos(5 * i * pi / 180.0) + (i == 9 && p == 0 ? 100.0 : 0.0);
       auto text = number.str();
       if (const auto dot = text.find('.'); dot != std::string::npos) text.replace(dot, 1, point);
       out << text << "\n";
@@ -282,7 +288,7 @@ TEST(Eulumdat, CandelaAreForAThousandLumensOfItsLamps) {
   const auto file = parsed(eulumdat(1, 24));
   EXPECT_FLOAT_EQ(at(file, 0, 0), 2000);
   EXPECT_NEAR(at(file, 60, 123), 1000, 1e-2);
-  EXPECT_NEAR(file.web.lumens, 2000.0 * kPi, 0.03 * 2000.0 * kPi);
+  EXPECT_NEAR(file.web.lumens, 2000.0 * pi, 0.03 * 2000.0 * pi);
   EXPECT_TRUE(file.warnings.empty()) << file.warnings.front();
   EXPECT_FLOAT_EQ(at(parsed(eulumdat(1, 24, 100.0, ",")), 0, 0), 2000) << "numbers may have commas";
   EXPECT_THAT(parsed(eulumdat(1, 24, 100.0)).warnings, testing::Contains(HasSubstr("say 2000 lm")));
@@ -291,7 +297,7 @@ TEST(Eulumdat, CandelaAreForAThousandLumensOfItsLamps) {
 TEST(Eulumdat, SymmetriesAreWrittenOutFromThePlaneThatTheyBeginAt) {
   // The first plane told has a bump: at C0, and for the plane C90-C270 at C270.
   const auto bump = [](const PhotometricFile& file, double azimuth) {
-    return static_cast<double>(at(file, 45, azimuth)) - 2000.0 * std::cos(0.25 * kPi);
+    return static_cast<double>(at(file, 45, azimuth)) - 2000.0 * std::cos(0.25 * pi);
   };
   for (const int symmetry : {0, 2, 4}) EXPECT_NEAR(bump(parsed(eulumdat(symmetry, 24)), 0), 200, 0.1) << symmetry;
   EXPECT_NEAR(bump(parsed(eulumdat(0, 24)), 180), 0, 0.1);
@@ -305,10 +311,10 @@ TEST(Eulumdat, SymmetriesAreWrittenOutFromThePlaneThatTheyBeginAt) {
 
 TEST(Eulumdat, WhatIsWrongIsNamedByItsLine) {
   const auto good = eulumdat(1, 24);
-  EXPECT_THAT(refusal(good.substr(0, good.size() / 2)), HasSubstr("the file ends before"));
-  EXPECT_THAT(refusal("a\n1\n7\n"), HasSubstr("line 3: symmetry indicator"));
-  EXPECT_THAT(refusal("a\n1\n0\n100000\n1\n100000\n"), HasSubstr("line 6: more than 262144 directions"));
-  EXPECT_THAT(refusal("a\n1\n4\n6\n60\n19\n"), HasSubstr("fourfold"));
+  EXPECT_THAT(photometricRefusal(good.substr(0, good.size() / 2)), HasSubstr("the file ends before"));
+  EXPECT_THAT(photometricRefusal("a\n1\n7\n"), HasSubstr("line 3: symmetry indicator"));
+  EXPECT_THAT(photometricRefusal("a\n1\n0\n100000\n1\n100000\n"), HasSubstr("line 6: more than 262144 directions"));
+  EXPECT_THAT(photometricRefusal("a\n1\n4\n6\n60\n19\n"), HasSubstr("fourfold"));
 }
 
 }  // namespace

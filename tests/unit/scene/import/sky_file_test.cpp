@@ -23,7 +23,7 @@ Result<SkyImage> read(const std::string& bytes) {
   return readSkyFile({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "sky.hdr");
 }
 
-std::string refusal(const std::string& bytes) {
+std::string skyRefusal(const std::string& bytes) {
   const auto image = read(bytes);
   EXPECT_FALSE(image);
   return image ? "" : image.error().text();
@@ -95,21 +95,21 @@ TEST(HdrFile, IsReadFlatAndPacked) {
 
 TEST(HdrFile, IsRefusedWithAReason) {
   const std::string pixel("\x80\x40\x20\x81", 4);
-  EXPECT_THAT(refusal(""), HasSubstr("sky.hdr: is neither"));
-  EXPECT_THAT(refusal("#?RADIANCE\n"), HasSubstr("header has no end"));
-  EXPECT_THAT(refusal("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + pixel), HasSubstr("xyze"));
-  EXPECT_THAT(refusal(hdr("+Y 1 +X 1", pixel)), HasSubstr("-Y rows +X columns"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X x", pixel)), HasSubstr("no two numbers"));
-  EXPECT_THAT(refusal(hdr("-Y 0 +X 4", pixel)), HasSubstr("no pixels"));
-  EXPECT_THAT(refusal(hdr("-Y 2 +X 1", pixel)), HasSubstr("row 1 of 2"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X 8", std::string("\x02\x02\x00\x08\x89\x01", 6))), HasSubstr("row 0"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", std::string("\x80\x40\x20\xFF", 4))), HasSubstr("pixel (0, 0)"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", pixel, "EXPOSURE=0\n")), HasSubstr("EXPOSURE must be a number"));
-  EXPECT_THAT(refusal(hdr("-Y 1 +X 1", pixel, "COLORCORR=1 2\n")), HasSubstr("COLORCORR must be three"));
+  EXPECT_THAT(skyRefusal(""), HasSubstr("sky.hdr: is neither"));
+  EXPECT_THAT(skyRefusal("#?RADIANCE\n"), HasSubstr("header has no end"));
+  EXPECT_THAT(skyRefusal("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + pixel), HasSubstr("xyze"));
+  EXPECT_THAT(skyRefusal(hdr("+Y 1 +X 1", pixel)), HasSubstr("-Y rows +X columns"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 1 +X x", pixel)), HasSubstr("no two numbers"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 0 +X 4", pixel)), HasSubstr("no pixels"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 2 +X 1", pixel)), HasSubstr("row 1 of 2"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 1 +X 8", std::string("\x02\x02\x00\x08\x89\x01", 6))), HasSubstr("row 0"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 1 +X 1", std::string("\x80\x40\x20\xFF", 4))), HasSubstr("pixel (0, 0)"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 1 +X 1", pixel, "EXPOSURE=0\n")), HasSubstr("EXPOSURE must be a number"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 1 +X 1", pixel, "COLORCORR=1 2\n")), HasSubstr("COLORCORR must be three"));
   // Four gigabytes, decoded, in a hundred bytes; and what would wrap round.
-  EXPECT_THAT(refusal(hdr("-Y 16384 +X 16384", pixel)), HasSubstr("16384 x 16384 pixels"));
-  EXPECT_THAT(refusal(hdr("-Y 18446744073709551615 +X 18446744073709551615", pixel)), HasSubstr("pixels"));
-  EXPECT_THAT(refusal(hdr("-Y 8192 +X 16384", pixel)), HasSubstr("row 0 of 8192"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 16384 +X 16384", pixel)), HasSubstr("16384 x 16384 pixels"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 18446744073709551615 +X 18446744073709551615", pixel)), HasSubstr("pixels"));
+  EXPECT_THAT(skyRefusal(hdr("-Y 8192 +X 16384", pixel)), HasSubstr("row 0 of 8192"));
 }
 
 TEST(ExrFile, IsReadWithAnyCompression) {
@@ -129,25 +129,25 @@ TEST(ExrFile, IsReadWithAnyCompression) {
 
 TEST(ExrFile, IsRefusedWithAReason) {
   const auto good = exr(64, 32, 2.0F);
-  for (std::size_t cut = 4; cut < good.size(); cut += good.size() / 40) EXPECT_NE(refusal(good.substr(0, cut)), "");
+  for (std::size_t cut = 4; cut < good.size(); cut += good.size() / 40) EXPECT_NE(skyRefusal(good.substr(0, cut)), "");
   for (const float wrong : {1e13F, std::numeric_limits<float>::quiet_NaN()})
-    EXPECT_THAT(refusal(exr(64, 32, wrong)), HasSubstr("pixel (0, 0)"));
-  EXPECT_THAT(refusal(exr(4, 2, 1.0F, Imf::ZIP_COMPRESSION, {"R", "G"})), HasSubstr("channels R, G and B"));
+    EXPECT_THAT(skyRefusal(exr(64, 32, wrong)), HasSubstr("pixel (0, 0)"));
+  EXPECT_THAT(skyRefusal(exr(4, 2, 1.0F, Imf::ZIP_COMPRESSION, {"R", "G"})), HasSubstr("channels R, G and B"));
   // A data window of 4 GB and more in a kilobyte: the header alone decides.
   const auto window = good.find(std::string("dataWindow\0box2i\0", 17)) + 21;
   for (const std::int32_t edge : {40'000, std::numeric_limits<std::int32_t>::max()}) {
     auto large = good;
     std::memcpy(large.data() + window + 8, &edge, sizeof(edge));
     std::memcpy(large.data() + window + 12, &edge, sizeof(edge));
-    EXPECT_THAT(refusal(large), HasSubstr("a sky may have"));
+    EXPECT_THAT(skyRefusal(large), HasSubstr("a sky may have"));
   }
   auto turned = good;
   const std::int32_t before = -100;
   std::memcpy(turned.data() + window + 8, &before, sizeof(before));
-  EXPECT_THAT(refusal(turned), HasSubstr("no pixels"));
+  EXPECT_THAT(skyRefusal(turned), HasSubstr("no pixels"));
   auto deep = good;
   deep[5] = static_cast<char>(deep[5] | 0x08);
-  EXPECT_THAT(refusal(deep), HasSubstr("one part"));
+  EXPECT_THAT(skyRefusal(deep), HasSubstr("one part"));
 }
 
 /// An attribute as a header has it.
@@ -161,14 +161,15 @@ std::string attribute(const std::string& name, const std::string& type, const st
 TEST(ExrFile, IsRefusedWhereItsHeaderCanBeReadInTwoWays) {
   const auto good = exr(64, 32, 2.0F);
   const auto with = [&](const std::string& more) { return good.substr(0, 8) + more + good.substr(8); };
-  EXPECT_THAT(refusal(with(attribute("dataWindow", "box2i", std::string(4, '\0')))), HasSubstr("dataWindow"));
-  EXPECT_THAT(refusal(with(attribute("dataWindow", "box2i", std::string(16, '\0')))), HasSubstr("dataWindow twice"));
-  EXPECT_THAT(refusal(with(attribute("screenWindowCenter", "m44d", std::string(8, '\0')))), HasSubstr("not as v2f"));
-  EXPECT_THAT(refusal(with(attribute("envmap", "envmap", std::string(1, '\1')))), HasSubstr("it is a cube"));
+  EXPECT_THAT(skyRefusal(with(attribute("dataWindow", "box2i", std::string(4, '\0')))), HasSubstr("dataWindow"));
+  EXPECT_THAT(skyRefusal(with(attribute("dataWindow", "box2i", std::string(16, '\0')))), HasSubstr("dataWindow twice"));
+  EXPECT_THAT(skyRefusal(with(attribute("screenWindowCenter", "m44d", std::string(8, '\0')))), HasSubstr("not as v2f"));
+  EXPECT_THAT(skyRefusal(with(attribute("envmap", "envmap", std::string(1, '\1')))), HasSubstr("it is a cube"));
   std::string channels;
   for (int i = 0; i < 65; ++i) channels += std::string(1, static_cast<char>('0' + i)) + '\0' + std::string(16, '\0');
-  EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels + '\0')), HasSubstr("more than 64"));
-  EXPECT_THAT(refusal(good.substr(0, 8) + attribute("channels", "chlist", channels.substr(0, 170))),
+  EXPECT_THAT(skyRefusal(good.substr(0, 8) + attribute("channels", "chlist", channels + '\0')),
+              HasSubstr("more than 64"));
+  EXPECT_THAT(skyRefusal(good.substr(0, 8) + attribute("channels", "chlist", channels.substr(0, 170))),
               HasSubstr("broken"));
 }
 
@@ -216,7 +217,7 @@ TEST(ExrFile, MayNotHoldManyLinesAtOnce) {
   const std::uint32_t size[2] = {16'384, 8192};
   const std::string tile(reinterpret_cast<const char*>(size), sizeof(size));
   tiled = tiled.substr(0, 8) + attribute("tiles", "tiledesc", tile + '\0') + tiled.substr(8);
-  EXPECT_THAT(refusal(tiled), HasSubstr("more than 64 MiB"));
+  EXPECT_THAT(skyRefusal(tiled), HasSubstr("more than 64 MiB"));
 }
 
 // What is wider than a SkyImage is reduced as it is read.

@@ -4,17 +4,11 @@
 
 #include <algorithm>
 
-#include "server/scene/charts/build.h"
+#include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {
 namespace {
-
-PatchScene build(const Scene& scene, std::uint64_t budget = 64) {
-  ChartOptions options;
-  options.texel_budget = budget;
-  return buildPatchScene(scene, options).value();
-}
 
 /// A floor of side 1 whose texture, `width` x `height` alphas, spans it once.
 Scene veiledFloor(AlphaMode mode, int width, int height, const std::vector<std::uint8_t>& alphas) {
@@ -46,20 +40,20 @@ double leafArea(const PatchScene& patches) {
 TEST(Opacity, OpaqueScenesHaveNoneAndKeepTheirArea) {
   Scene scene;
   place(scene, floorQuad(1.0), glm::dmat4(1.0), Material{});
-  const auto patches = build(scene);
+  const auto patches = build(scene, 64);
   EXPECT_TRUE(patches.opacity.empty());
   EXPECT_NEAR(leafArea(patches), 1.0, 1e-5);
 }
 
 TEST(Opacity, AlphaOfAnOpaqueMaterialMeansNothing) {
-  const auto patches = build(veiledFloor(AlphaMode::kOpaque, 1, 1, {0}));
+  const auto patches = build(veiledFloor(AlphaMode::kOpaque, 1, 1, {0}), 64);
   EXPECT_TRUE(patches.opacity.empty());
   EXPECT_NEAR(leafArea(patches), 1.0, 1e-5);
 }
 
 TEST(Opacity, AMaskCutsOutWhatIsBelowTheCutoff) {
   // left half cut out; the bilinear step in the middle is cut at one half, where the border is
-  const auto patches = build(veiledFloor(AlphaMode::kMask, 2, 1, {0, 255}));
+  const auto patches = build(veiledFloor(AlphaMode::kMask, 2, 1, {0, 255}), 64);
   ASSERT_EQ(patches.surfaces.size(), 1U);
   EXPECT_TRUE(patches.surfaces[0].see_through);
   // The texture repeats: a quarter of a pixel's blend at both outer borders is symmetrical, so half is left.
@@ -70,12 +64,12 @@ TEST(Opacity, AMaskCutsOutWhatIsBelowTheCutoff) {
 }
 
 TEST(Opacity, AMaskThatCutsEverythingLeavesNoArea) {
-  const auto patches = build(veiledFloor(AlphaMode::kMask, 1, 1, {100}));
+  const auto patches = build(veiledFloor(AlphaMode::kMask, 1, 1, {100}), 64);
   EXPECT_EQ(leafArea(patches), 0.0);
 }
 
 TEST(Opacity, BlendedAreaIsAlphaTimesTheWhole) {
-  const auto patches = build(veiledFloor(AlphaMode::kBlend, 1, 1, {51}));
+  const auto patches = build(veiledFloor(AlphaMode::kBlend, 1, 1, {51}), 64);
   EXPECT_NEAR(leafArea(patches), 0.2, 1e-3);
 }
 
@@ -85,7 +79,7 @@ TEST(Opacity, TransmissionLetsItsFactorOfWhatIsNotReflectedThrough) {
   Material glass;
   glass.transmission = 0.75F;
   place(scene, floorQuad(1.0), glm::dmat4(1.0), glass);
-  EXPECT_NEAR(leafArea(build(scene)), 1.0 - 0.75 * (1.0 - 0.04 - 0.96 / 21.0), 2e-3);  // kept in steps of 1/255
+  EXPECT_NEAR(leafArea(build(scene, 64)), 1.0 - 0.75 * (1.0 - 0.04 - 0.96 / 21.0), 2e-3);  // kept in steps of 1/255
 }
 
 TEST(Opacity, WithoutAnInterfaceTransmissionLetsItsFactorThroughWhateverTheMode) {
@@ -96,7 +90,7 @@ TEST(Opacity, WithoutAnInterfaceTransmissionLetsItsFactorThroughWhateverTheMode)
     clear.ior = 1.0F;
     clear.alpha_mode = mode;
     place(scene, floorQuad(1.0), glm::dmat4(1.0), clear);
-    EXPECT_NEAR(leafArea(build(scene)), 0.25, 2e-3);
+    EXPECT_NEAR(leafArea(build(scene, 64)), 0.25, 2e-3);
   }
 }
 

@@ -5,19 +5,13 @@
 #include <array>
 #include <utility>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/shading/shade.h"
 #include "server/scene/values/patch_scene.h"
+#include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {
 namespace {
-
-PatchScene build(const Scene& scene, std::uint64_t budget) {
-  ChartOptions options;
-  options.texel_budget = budget;
-  return buildPatchScene(scene, options).value();
-}
 
 Texture textureOf(int width, int height, const std::vector<std::uint8_t>& grey, bool srgb) {
   Texture texture;

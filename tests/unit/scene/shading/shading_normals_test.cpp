@@ -7,20 +7,12 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/values/patch_scene.h"
+#include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {
 namespace {
-
-PatchScene build(const Scene& scene) {
-  ChartOptions options;
-  options.texel_budget = 4000;
-  auto patches = buildPatchScene(scene, options);
-  if (!patches) ADD_FAILURE() << patches.error().text();
-  return patches ? std::move(*patches) : PatchScene{};
-}
 
 /// Normals of a ball about the origin of its mesh.
 Primitive smoothBall(int levels) {
@@ -53,7 +45,7 @@ TEST(ShadingNormals, AreThoseOfTheFileAtEveryCornerHoweverItIsPlaced) {
   for (const auto& world : {glm::dmat4(1.0), mirrored, glm::rotate(stretched, 0.7, glm::dvec3(1, 2, 3))}) {
     Scene scene;
     place(scene, ball, world);
-    const auto patches = build(scene);
+    const auto patches = build(scene, 4000);
     const ShadingNormals normals(scene, patches);
     ASSERT_FALSE(normals.empty());
     const glm::dmat3 to_mesh = glm::inverse(glm::dmat3(world));
@@ -70,7 +62,7 @@ TEST(ShadingNormals, AreInterpolatedWithinATriangle) {
   Primitive floor = floorQuad(2.0, -1.0, -1.0);
   for (const auto& p : floor.positions) floor.normals.emplace_back(glm::normalize(glm::dvec3(0.4 * p.x, 1.0, 0.0)));
   const auto scene = sceneOf(floor);
-  const auto patches = build(scene);
+  const auto patches = build(scene, 4000);
   const ShadingNormals normals(scene, patches);
   const auto all = corners(patches);
   for (const auto& weight : {glm::vec3(0.2F, 0.3F, 0.5F), glm::vec3(0.6F, 0.1F, 0.3F)}) {
@@ -89,28 +81,28 @@ TEST(ShadingNormals, AreInterpolatedWithinATriangle) {
 
 TEST(ShadingNormals, OfFlatFacesAreNone) {
   Primitive room = box({0, 0, 0}, {1, 2, 3});
-  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room))).empty()) << "no NORMAL";
+  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room), 4000)).empty()) << "no NORMAL";
   room.normals.resize(room.positions.size());
   for (std::size_t i = 0; i < room.indices.size(); i += 3) {
     const auto corner = [&](std::size_t k) { return room.positions[room.indices[i + k]]; };
     const auto normal = glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
     for (std::size_t k = 0; k < 3; ++k) room.normals[room.indices[i + k]] = glm::vec3(normal);
   }
-  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room))).empty()) << "the faces' own";
+  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room), 4000)).empty()) << "the faces' own";
   room.normals.assign(room.positions.size(), glm::vec3(0.0F));
-  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room))).empty()) << "unusable";
+  EXPECT_TRUE(ShadingNormals(sceneOf(room), build(sceneOf(room), 4000)).empty()) << "unusable";
 }
 
 TEST(ShadingNormals, ThatPointToTheBackCountAsFlat) {
   auto ball = smoothBall(1);
   for (auto& normal : ball.normals) normal = -normal;
   const auto scene = sceneOf(ball);
-  const auto patches = build(scene);
+  const auto patches = build(scene, 4000);
   EXPECT_TRUE(ShadingNormals(scene, patches).empty());
 }
 
 TEST(ShadingNormals, ChartsOfASmoothBallAreStitchedHoweverSteepItsFacets) {
-  const auto seamsOf = [](const Primitive& ball) { return build(sceneOf(ball)).seams.size(); };
+  const auto seamsOf = [](const Primitive& ball) { return build(sceneOf(ball), 4000).seams.size(); };
   EXPECT_EQ(seamsOf(icoSphere(1.0, 0)), 0U) << "42 degrees";
   EXPECT_EQ(seamsOf(smoothBall(0)), 30U);
 }
@@ -120,7 +112,7 @@ TEST(ShadingNormals, WhereOneCornerPointsToTheBackTheOthersStillCount) {
   floor.normals.assign(floor.positions.size(), glm::normalize(glm::vec3(0.3F, 1.0F, 0.0F)));
   floor.normals[0] = {0.0F, -1.0F, 0.0F};
   const auto scene = sceneOf(floor);
-  const auto patches = build(scene);
+  const auto patches = build(scene, 4000);
   const ShadingNormals normals(scene, patches);
   ASSERT_FALSE(normals.empty());
   for (const auto& corner : corners(patches)) {

@@ -7,10 +7,13 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "tests/unit/scene/values/degree.h"
+
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi, kDegree = kPi / 180.0;
+using std::numbers::pi;
+using test::kDegree;
 
 /// Altitude and azimuth, degrees.
 std::pair<double, double> sunOf(const char* time, double latitude, double longitude) {
@@ -25,14 +28,14 @@ double arrives(const SkyImage& sky, const glm::dvec3& normal) {
   double sum = 0.0;
   for (std::size_t y = 0; y < sky.height / 2; ++y) {
     for (std::size_t x = 0; x < sky.width; ++x) {
-      const double polar = (static_cast<double>(y) + 0.5) / static_cast<double>(sky.height) * kPi;
-      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / static_cast<double>(sky.width) - 1.0) * kPi;
+      const double polar = (static_cast<double>(y) + 0.5) / static_cast<double>(sky.height) * pi;
+      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / static_cast<double>(sky.width) - 1.0) * pi;
       const glm::dvec3 d(std::sin(polar) * std::cos(azimuth), std::cos(polar), std::sin(polar) * std::sin(azimuth));
       sum +=
           std::max(0.0, glm::dot(normal, d)) * std::sin(polar) * static_cast<double>(sky.texels[y * sky.width + x].x);
     }
   }
-  return sum * 2.0 * kPi * kPi / static_cast<double>(sky.width * sky.height);
+  return sum * 2.0 * pi * pi / static_cast<double>(sky.width * sky.height);
 }
 
 // Meeus, "Astronomical Algorithms", chapter 13 ff., and the equinoxes and solstices of almanacs.
@@ -75,10 +78,10 @@ TEST(Sun, OfTimesThatAreNoneIsNotTold) {
 TEST(CieSky, OvercastBringsSevenNinthsOfPi) {
   const auto sky = daylightImage(cieShape(kCieOvercast), {0, 1, 0}, 1000.0, 0.0);
   const double zenith = static_cast<double>(sky.texels[0].x);
-  EXPECT_NEAR(1000.0, 7.0 / 9.0 * kPi * zenith, 1.0);
+  EXPECT_NEAR(1000.0, 7.0 / 9.0 * pi * zenith, 1.0);
   EXPECT_NEAR(arrives(sky, {0, 1, 0}), 1000.0, 0.5);
   // Moon and Spencer: a wall gets (pi / 6 + 4 / 9) Lz, 0.396 of the ground.
-  EXPECT_NEAR(arrives(sky, {1, 0, 0}), (kPi / 6.0 + 4.0 / 9.0) * zenith, 0.5);
+  EXPECT_NEAR(arrives(sky, {1, 0, 0}), (pi / 6.0 + 4.0 / 9.0) * zenith, 0.5);
   EXPECT_NEAR(arrives(sky, {1, 0, 0}) / 1000.0, 0.396, 0.001);
 }
 
@@ -104,7 +107,7 @@ TEST(PerezSky, BringsWhatAClearDayDoes) {
   const auto sky = perezSky(power, altitude, 172);
   EXPECT_NEAR(sky.level.direct, 96'000.0, 5000.0);
   EXPECT_NEAR(sky.level.diffuse, 14'000.0, 5000.0);
-  const SunPlace sun{altitude, kPi};
+  const SunPlace sun{altitude, pi};
   const auto image = daylightImage(sky.shape, sun.direction(), sky.level.diffuse, 100.0);
   EXPECT_NEAR(arrives(image, {0, 1, 0}), sky.level.diffuse, 0.005 * sky.level.diffuse);
   EXPECT_FLOAT_EQ(image.texels.back().x, 100.0F);

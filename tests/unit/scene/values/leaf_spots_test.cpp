@@ -14,9 +14,11 @@
 namespace radiosity::scene {
 namespace {
 
-using namespace test;
+using test::box;
+using test::floorQuad;
+using test::place;
 
-PatchScene build(const Scene& scene, double texel_size) {
+PatchScene buildWithTexels(const Scene& scene, double texel_size) {
   ChartOptions options;
   options.texel_size_m = texel_size;
   auto patches = buildPatchScene(scene, options);
@@ -33,7 +35,7 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   Scene scene;
   place(scene, floorQuad(10.0, -5.0, -5.0));
   place(scene, box({-1.15, 0.0, -1.0}, {1.0, 2.0, 1.0}));
-  const PatchScene patches = build(scene, 0.25);
+  const PatchScene patches = buildWithTexels(scene, 0.25);
   std::size_t seen = 0;
   for (std::size_t i = 0; i < 1600; ++i) {
     const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
@@ -63,7 +65,7 @@ TEST(LeafSpots, LieOnTheirOwnTrianglesWhereAChartIsBentALittle) {
   sheet.indices = {0, 3, 1, 1, 3, 4, 1, 4, 2, 2, 4, 5};
   Scene scene;
   place(scene, sheet);
-  const PatchScene patches = build(scene, 0.3);
+  const PatchScene patches = buildWithTexels(scene, 0.3);
   std::size_t bent = 0;
   for (const auto& leaf : patches.leaves) {
     if (!leaf.hasSpots() || leaf.full) continue;
@@ -98,7 +100,7 @@ TEST(LeafSpots, WhatIsHiddenOrLeftMayBeNarrowerThanPlacesAreApart) {
     Scene scene;
     place(scene, wholeFloor());
     place(scene, box({low, 0.0, -2.0}, {high, 2.0, 2.0}));
-    const PatchScene patches = build(scene, 0.25);
+    const PatchScene patches = buildWithTexels(scene, 0.25);
     double area = 0.0, leaves = 0.0;
     for (std::size_t i = 0; i < 1600; ++i) {
       const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
@@ -121,7 +123,7 @@ TEST(LeafSpots, AThinStripBehindAPostIsAPartLikeAnyOther) {
   Scene scene;
   place(scene, wholeFloor());
   place(scene, box({0.023, 0.0, -2.0}, {0.12, 2.0, 2.0}));  // of leaves 0.25 wide: 0.023 before it, 0.13 behind
-  const PatchScene patches = build(scene, 0.25);
+  const PatchScene patches = buildWithTexels(scene, 0.25);
   std::size_t seen = 0;
   for (std::size_t i = 0; i < 1600; ++i) {
     const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
@@ -202,7 +204,7 @@ TEST(LeafSpots, FullLeavesHaveThemOnlyInNarrowGapsAndBesideThem) {
   Material sheet;  // seen from both sides it bounds no solid
   sheet.double_sided = true;
   place(scene, floorQuad(1.0, 1.5, 1.5), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 2.95, 0, 1), sheet);
-  const PatchScene patches = build(scene, 0.25);
+  const PatchScene patches = buildWithTexels(scene, 0.25);
   std::size_t above = 0, by_its_rim = 0;
   for (const auto& surface : patches.surfaces) {
     for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {

@@ -10,7 +10,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 /// Of radiance(direction), in the middles of texels.
 template <typename Radiance>
@@ -18,8 +18,8 @@ SkyImage imageOf(std::size_t width, std::size_t height, const Radiance& radiance
   SkyImage image{width, height, {}};
   for (std::size_t y = 0; y < height; ++y) {
     for (std::size_t x = 0; x < width; ++x) {
-      const double polar = (static_cast<double>(y) + 0.5) / static_cast<double>(height) * kPi;
-      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / static_cast<double>(width) - 1.0) * kPi;
+      const double polar = (static_cast<double>(y) + 0.5) / static_cast<double>(height) * pi;
+      const double azimuth = (2.0 * (static_cast<double>(x) + 0.5) / static_cast<double>(width) - 1.0) * pi;
       image.texels.push_back(glm::vec3(radiance(
           glm::dvec3(std::sin(polar) * std::cos(azimuth), std::cos(polar), std::sin(polar) * std::sin(azimuth)))));
     }
@@ -31,10 +31,10 @@ glm::dvec3 lightOf(const SkyImage& image) {
   glm::dvec3 sum(0.0);
   for (std::size_t y = 0; y < image.height; ++y) {
     const auto height = [&](std::size_t row) {
-      return std::cos(kPi * static_cast<double>(row) / static_cast<double>(image.height));
+      return std::cos(pi * static_cast<double>(row) / static_cast<double>(image.height));
     };
     for (std::size_t x = 0; x < image.width; ++x)
-      sum += 2.0 * kPi / static_cast<double>(image.width) * (height(y) - height(y + 1)) *
+      sum += 2.0 * pi / static_cast<double>(image.width) * (height(y) - height(y + 1)) *
              glm::dvec3(image.texels[y * image.width + x]);
   }
   return sum;
@@ -51,7 +51,7 @@ const auto kSlope = [](const glm::dvec3& d) { return glm::dvec3(2.0 + d.y, 2.0 +
 const glm::dvec3 kSun = glm::normalize(glm::dvec3(0.4, 0.7, -0.3));
 /// A degree wide, 1e5 times as bright as the sky around it.
 const auto kSunny = [](const glm::dvec3& d) {
-  return glm::dot(d, kSun) > std::cos(kPi / 360.0) ? glm::dvec3(1e5, 9e4, 8e4) : glm::dvec3(1.0, 1.5, 2.0);
+  return glm::dot(d, kSun) > std::cos(pi / 360.0) ? glm::dvec3(1e5, 9e4, 8e4) : glm::dvec3(1.0, 1.5, 2.0);
 };
 
 TEST(SkyImage, KeepsItsLightWhateverItIsReducedTo) {
@@ -70,7 +70,7 @@ TEST(SkyPicture, OfOneColourHasNothingBright) {
   const SkyPicture sky(imageOf(64, 32, [](const glm::dvec3&) { return glm::dvec3(3.0); }));
   EXPECT_TRUE(sky.bright().empty());
   ASSERT_EQ(sky.whole().size(), 1U);
-  EXPECT_NEAR(sky.whole()[0].light.x, 12.0 * kPi, 1e-5);
+  EXPECT_NEAR(sky.whole()[0].light.x, 12.0 * pi, 1e-5);
   EXPECT_NEAR(sky.restOver(1.0, 0.7, -0.3, 0.5).y, 3.0, 1e-6);
   EXPECT_NEAR(sky.restOver(3.0, 7.0, -1.0, 2.0).y, 3.0, 1e-6) << "more than a turn";
   EXPECT_TRUE(sky.shines(true));
@@ -81,8 +81,8 @@ TEST(SkyPicture, TellsTheSunApartAndKeepsAllLight) {
   const auto image = imageOf(1024, 512, kSunny);
   const SkyPicture sky(image);
   ASSERT_FALSE(sky.bright().empty());
-  glm::dvec3 light = sky.restOver(-kPi, 2.0 * kPi, -1.0, 2.0) * 4.0 * kPi;
-  EXPECT_NEAR(light.x, 4.0 * kPi, 0.05) << "the sky without the sun";
+  glm::dvec3 light = sky.restOver(-pi, 2.0 * pi, -1.0, 2.0) * 4.0 * pi;
+  EXPECT_NEAR(light.x, 4.0 * pi, 0.05) << "the sky without the sun";
   for (const auto& lamp : sky.bright()) light += lamp.light;
   EXPECT_LT(glm::distance(light, lightOf(image)), 1e-4 * glm::length(lightOf(image)));
   glm::dvec3 whole(0.0);
@@ -90,7 +90,7 @@ TEST(SkyPicture, TellsTheSunApartAndKeepsAllLight) {
   EXPECT_LT(glm::distance(whole, lightOf(image)), 1e-4 * glm::length(lightOf(image)));
   for (int i = 0; i < 256; ++i) {
     const auto drawn = skyDirection(*sky.bright()[0].table, {(i % 16 + 0.5) / 16.0, (i / 16 + 0.5) / 16.0});
-    EXPECT_GT(glm::dot(drawn, kSun), std::cos(kPi / 180.0));
+    EXPECT_GT(glm::dot(drawn, kSun), std::cos(pi / 180.0));
   }
 }
 

@@ -7,12 +7,14 @@
 #include <numbers>
 
 #include "server/scene/values/light_web.h"
+#include "tests/unit/scene/values/degree.h"
 
 namespace radiosity::scene {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kDegree = kPi / 180.0;
+using std::numbers::pi;
+using test::kDegree;
+
 constexpr int kDraws = 1 << 16;
 
 /// Means over draws.
@@ -65,7 +67,7 @@ TEST(WebDirections, FollowTheAzimuthToo) {
   const auto drawn = draw(web, 90.0);
   EXPECT_NEAR(drawn.weight, 1.0, 1e-3);
   EXPECT_NEAR(drawn.cosine, 0.5, 1e-3);
-  EXPECT_NEAR(drawn.across, kPi / 8.0, 4e-3) << "interpolated, cosines are 0.25 % low";
+  EXPECT_NEAR(drawn.across, pi / 8.0, 4e-3) << "interpolated, cosines are 0.25 % low";
 }
 
 TEST(WebDirections, OfADarkWebWeighNothing) {

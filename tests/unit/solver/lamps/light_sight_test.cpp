@@ -14,8 +14,8 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr float kFloor = -0.4F, kScreen = 0.0F, kLamp = 0.4F;
-constexpr std::uint32_t kLeaves = 20;
+constexpr float kRoomFloor = -0.4F, kScreen = 0.0F, kLamp = 0.4F;
+constexpr std::uint32_t kRoomLeaves = 20;
 
 /// A floor of texels 0.04 wide, a lamp above it, and maybe a screen half way up that reaches from x = 0 on to one side.
 class LightSightTest : public testing::Test {
@@ -30,8 +30,8 @@ class LightSightTest : public testing::Test {
   }
 
   void makeRoom(bool has_screen) {
-    std::vector<test::Quad> quads{{{-0.4F, kFloor, -0.4F}, {0.0F, 0.0F, 0.8F}, {0.8F, 0.0F, 0.0F}}};
-    quads[0].width = quads[0].height = kLeaves;
+    std::vector<test::Quad> quads{{{-0.4F, kRoomFloor, -0.4F}, {0.0F, 0.0F, 0.8F}, {0.8F, 0.0F, 0.0F}}};
+    quads[0].width = quads[0].height = kRoomLeaves;
     if (has_screen) quads.push_back({{0.0F, kScreen, -0.49F}, {0.0F, 0.0F, 0.98F}, {0.49F, 0.0F, 0.0F}});
     scene_ = test::makeQuadScene(quads);
     sides_ = makeSides(*scene_.patches);
@@ -64,7 +64,7 @@ class LightSightTest : public testing::Test {
 TEST_F(LightSightTest, WhereNothingHidesTheLampItIsTheFormFactor) {
   makeRoom(false);
   const LightSight sight(rays_, lamp_, 1);
-  for (std::uint32_t value = 0; value < kLeaves * kLeaves; ++value) {
+  for (std::uint32_t value = 0; value < kRoomLeaves * kRoomLeaves; ++value) {
     for (std::size_t half = 0; half < 2; ++half) {
       const auto link = sight.link(value, half, 4);
       ASSERT_TRUE(link);
@@ -78,7 +78,7 @@ TEST_F(LightSightTest, InAHalfShadowItIsThatOfWhatIsSeen) {
   const LightSight sight(rays_, lamp_, 1);
   double square = 0.0, differ = 0.0, all = 0.0;
   std::size_t half_lit = 0, dark = 0;
-  for (std::uint32_t value = 0; value < kLeaves * kLeaves; ++value) {
+  for (std::uint32_t value = 0; value < kRoomLeaves * kRoomLeaves; ++value) {
     const auto one = sight.link(value, 0, 4), other = sight.link(value, 1, 4);
     ASSERT_TRUE(one && other);
     const double should = expected(value, true), open = expected(value, false);

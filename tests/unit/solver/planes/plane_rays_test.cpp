@@ -13,7 +13,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 /// One unit across, level, at y = -0.2, in the unit box.
 PlaneGrid levelGrid(std::uint32_t columns, std::uint32_t rows) {
@@ -83,7 +83,7 @@ TEST_F(PlaneRaysTest, UnderADiscHaveTheFormFactorOfADisc) {
   disc.half = {0.2 * scale, 0.2 * scale};
   sources_.lights = {disc};
   const auto found = figures(light(), levelGrid(1, 1));
-  const double expected = kPi * 100.0 * 0.04 / (0.04 + 0.25);
+  const double expected = pi * 100.0 * 0.04 / (0.04 + 0.25);
   EXPECT_NEAR(found.figures.mean, expected, 1e-3 * expected);
 }
 
@@ -95,7 +95,7 @@ class PlaneUnderALamp : public PlaneRaysTest {
 // A rectangle a x b over its corner, parallel: F = (A atan(B) + B' atan(A')) / (2 pi) of Howell's catalogue, C-13.
 TEST_F(PlaneUnderALamp, HasTheFormFactorOfARectangle) {
   const double side = 0.1 / 0.6, root = std::sqrt(1.0 + side * side);
-  const double quarter = 2.0 * side / root * std::atan(side / root) / (2.0 * kPi);
+  const double quarter = 2.0 * side / root * std::atan(side / root) / (2.0 * pi);
   const auto found = figures(light(), levelGrid(1, 1));
   EXPECT_NEAR(found.figures.mean, 50.0 * 4.0 * quarter, 1e-4 * found.figures.mean);
 }

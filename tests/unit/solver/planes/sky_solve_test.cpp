@@ -17,7 +17,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 LightSources overcast(double ground_nits = 0.0) {
   LightSources sources;
@@ -59,12 +59,12 @@ TEST_F(DaylightFactors, OfAnUnobstructedPlaneIsAHundredPercent) {
 // L cos^2 g cos a over its quarter, Lz (pi / 6 + 4 / 9): 39.6 % (Moon and Spencer 1942).
 TEST_F(DaylightFactors, OfAnUprightPlaneIsTwoFifths) {
   const auto found = factorAt({floor()}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0});
-  EXPECT_NEAR(found.mean, 100.0 * (kPi / 6.0 + 4.0 / 9.0) / (7.0 * kPi / 9.0), 0.3);
+  EXPECT_NEAR(found.mean, 100.0 * (pi / 6.0 + 4.0 / 9.0) / (7.0 * pi / 9.0), 0.3);
 }
 
 // Ground of luminance G fills the lower quarter: half of what level ground of pi G would get.
 TEST_F(DaylightFactors, CountTheGroundOutside) {
-  const double ground = 0.2 * 10'000.0 / kPi;
+  const double ground = 0.2 * 10'000.0 / pi;
   const test::Quad chip{{-0.5F, -0.4F, 0.5F}, {0.01F, 0.0F, 0.0F}, {0.0F, 0.0F, -0.01F}};
   const auto black = factorAt({chip}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0});
   const auto grey = factorAt({chip}, {0.0, 0.3, 0.0}, {1.0, 0.0, 0.0}, ground);
@@ -126,7 +126,7 @@ double skyComponent(const glm::dvec3& at, const glm::dvec3& normal, const glm::d
              length / square;
     }
   }
-  return 100.0 * sum * area / (kGrid * kGrid) / (7.0 * kPi / 9.0);
+  return 100.0 * sum * area / (kGrid * kGrid) / (7.0 * pi / 9.0);
 }
 
 TEST_F(DaylightFactors, UnderARoofLightAreItsSkyComponent) {

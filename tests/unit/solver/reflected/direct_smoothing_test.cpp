@@ -8,22 +8,22 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kSize = 32;
+constexpr std::uint32_t kShadowSize = 32;
 
 /// A side of square leaves under a lamp whose shadow has a wide edge.
-struct Field {
+struct ShadowField {
   std::vector<Side> sides{1};
-  std::vector<float> area = std::vector<float>(kSize * kSize, 1.0F / (kSize * kSize));
+  std::vector<float> area = std::vector<float>(kShadowSize * kShadowSize, 1.0F / (kShadowSize * kShadowSize));
   std::vector<float> truth;
   DirectSmoothing::Halves halves;
 
-  explicit Field(float noise) {
-    sides[0].width = sides[0].height = kSize;
-    sides[0].leaf_count = kSize * kSize;
+  explicit ShadowField(float noise) {
+    sides[0].width = sides[0].height = kShadowSize;
+    sides[0].leaf_count = kShadowSize * kShadowSize;
     std::mt19937 random(1);
     std::normal_distribution<float> off(0.0F, noise);
-    for (std::uint32_t leaf = 0; leaf < kSize * kSize; ++leaf) {
-      truth.push_back(100.0F + static_cast<float>(leaf % kSize));
+    for (std::uint32_t leaf = 0; leaf < kShadowSize * kShadowSize; ++leaf) {
+      truth.push_back(100.0F + static_cast<float>(leaf % kShadowSize));
       for (auto& half : halves) half.push_back(glm::vec3(truth.back() + (noise > 0.0F ? off(random) : 0.0F)));
     }
   }
@@ -38,7 +38,7 @@ struct Field {
 };
 
 TEST(DirectSmoothing, TakesOutGrainAndSaysWhatItCost) {
-  Field field(5.0F);
+  ShadowField field(5.0F);
   const double before = field.off();
   DirectSmoothing smoothing;
   EXPECT_TRUE(smoothing.biasOfLeaves().empty());
@@ -59,7 +59,7 @@ TEST(DirectSmoothing, TakesOutGrainAndSaysWhatItCost) {
 }
 
 TEST(DirectSmoothing, LeavesLightThatIsKnownAlone) {
-  Field field(0.0F);
+  ShadowField field(0.0F);
   const auto before = field.halves;
   DirectSmoothing smoothing;
   smoothing.smooth(field.sides, field.area, {}, field.halves);
@@ -68,13 +68,13 @@ TEST(DirectSmoothing, LeavesLightThatIsKnownAlone) {
 }
 
 TEST(DirectSmoothing, TakesNoMeanAcrossWhatPartsLight) {
-  Field field(5.0F);
+  ShadowField field(5.0F);
   const auto before = field.halves;
   DirectSmoothing smoothing;
   smoothing.smooth(
       field.sides, field.area, [](std::uint32_t value) { return value == 0; }, field.halves);
   EXPECT_EQ(field.halves[0][0], before[0][0]);
-  EXPECT_NE(field.halves[0][kSize * 8 + 8], before[0][kSize * 8 + 8]);
+  EXPECT_NE(field.halves[0][kShadowSize * 8 + 8], before[0][kShadowSize * 8 + 8]);
 }
 
 }  // namespace
