@@ -4,7 +4,7 @@
 
 Runs inside Blender (made with 3.4). The same triangles, TEXCOORD_1 and reflectances as the GLB has, and the same
 physics as the project's conventions: a plain Diffuse BSDF, a Principled one for metal, Translucent for paper, Transparent
-and Glossy for glass; the back of a single-sided triangle is black and does not shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
+and Glossy for glass; of paper that lies there twice, turned over, light passes one; the back of a single-sided triangle is black and does not shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
 
 Sample counts grow by four for as long as the next bake should take at most T seconds. For each, every page is written as
 FOLDER/<samples>.<page>.pfm (irradiance in lux, row 0 = v 0) and a line "bake: {JSON}" is printed: samples, seconds (of
@@ -61,7 +61,8 @@ class Glb:
         return matrix
 
     def primitives(self):
-        """(corners n x 3 x 3, uvs n x 3 x 2, material or None, page or -1, colour) of every primitive in the scene."""
+        """Of every primitive in the scene: corners (n x 3 x 3), uvs (n x 3 x 2), and what it is: material or None, page
+        or -1, colour, whether it is the back of another one, turned over."""
         scene = self.gltf["scenes"][self.gltf.get("scene", 0)]
         open_nodes = [(index, np.eye(4)) for index in scene.get("nodes", [])]
         while open_nodes:
@@ -84,7 +85,9 @@ class Glb:
         order = order[:len(order) // 3 * 3].reshape(-1, 3)
         if np.linalg.det(world[:3, :3]) < 0:
             order = order[:, ::-1]
-        return position[order], uv[order], primitive.get("material"), primitive.get("extras", {}).get("lightmap", -1), self.colour(attributes)
+        extras = primitive.get("extras", {})
+        is_back = extras.get("lightmapSide") == "back"
+        return position[order], uv[order], (primitive.get("material"), extras.get("lightmap", -1), self.colour(attributes), is_back)
 
     def colour(self, attributes):
         """The one vertex colour of a primitive. Several cannot be had: the reference has no scene of that kind either."""
@@ -127,6 +130,7 @@ class Material:
         strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
         self.nits = strength * np.array(material.get("emissiveFactor", (0, 0, 0)), float)
         self.double_sided = material.get("doubleSided", False) or self.is_glass
+        self.passes = self.is_glass or self.transmittance.max() > 0
 
 
 class Shader:
@@ -156,7 +160,6 @@ class Shader:
         for i, socket in enumerate((part, a, b)):
             self.link(socket, node.inputs[i])
         return node.outputs[0]
-
 
     def math(self, operation, *operands):
         node = self.nodes.new("ShaderNodeMath")
@@ -194,7 +197,17 @@ def surface_of(shader, look):
     return surface
 
 
-def make_material(name, look, image):
+def baked_of(shader, look):
+    """What texels are baked of: white, whatever they reflect, so that their light is what arrives. Of paper they hold
+    the light of both sides, by what its base colour would make of it."""
+    if look.transmittance.max() == 0:
+        return shader.bsdf("ShaderNodeBsdfDiffuse", (1, 1, 1), Roughness=0.0)
+    return shader.add(shader.bsdf("ShaderNodeBsdfDiffuse", look.reflectance / look.base, Roughness=0.0),
+                      shader.bsdf("ShaderNodeBsdfTranslucent", look.transmittance / look.base))
+
+
+def make_material(name, look, image, is_twin):
+    """`is_twin`: another sheet lies in the same place, turned over, which is not to be passed once more."""
     shader = Shader(name)
     nodes, link = shader.nodes, shader.link
     output = nodes.new("ShaderNodeOutputMaterial")
@@ -202,8 +215,9 @@ def make_material(name, look, image):
     if look.nits.max() > 0:
         shine = shader.bsdf("ShaderNodeEmission", look.nits / look.nits.max(), Strength=look.nits.max())
         surface = shader.add(surface, shine)
-    if not look.double_sided:
-        back = shader.bsdf("ShaderNodeBsdfDiffuse", (0, 0, 0))
+    surface = shader.mix(nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], surface, baked_of(shader, look))
+    if is_twin or not look.double_sided:
+        back = shader.bsdf("ShaderNodeBsdfTransparent", (1, 1, 1)) if is_twin else shader.bsdf("ShaderNodeBsdfDiffuse", (0, 0, 0))
         surface = shader.mix(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], surface, back)
     link(surface, output.inputs["Surface"])
     texture = nodes.new("ShaderNodeTexImage")
@@ -233,6 +247,13 @@ def make_mesh(corners, uvs, material_of):
     return mesh
 
 
+def apart(corners):
+    """Triangles, so much farther to their front that single precision can tell."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return corners + (2e-5 * normals / np.maximum(lengths, 1e-30))[:, None, :]
+
+
 def load(path, sizes):
     """Builds the Blender scene; returns the images of the pages."""
     for old in list(bpy.data.objects):
@@ -243,7 +264,7 @@ def load(path, sizes):
     if "radiositySky" in (glb.gltf.get("extras") or {}):
         raise ValueError("a sky is not baked")
     parts = list(glb.primitives())
-    pages = 1 + max((page for *_, page, _ in parts), default=-1)
+    pages = 1 + max((part[2][1] for part in parts), default=-1)
     if pages < 1:
         raise ValueError("no primitive names a lightmap page")
     if len(sizes) != pages:
@@ -252,19 +273,23 @@ def load(path, sizes):
     for page, (width, height) in enumerate(sizes):
         images.append(bpy.data.images.new(f"page {page}", width, height, float_buffer=True, is_data=True))
     spare = bpy.data.images.new("no page", 4, 4, float_buffer=True, is_data=True)
-    slot = [(-1 if material is None else material, page, colour) for _, _, material, page, colour in parts]
+    looks = [Material(glb.gltf, material, colour) for _, _, (material, _, colour, _) in parts]
+    # Sheets that pass light and lie there twice, as the lit GLB has those with light on both sides, are moved apart.
+    backs = {part[2][0] for part, look in zip(parts, looks) if part[2][3] and look.passes}
+    slot = [(-1 if material is None else material, page, colour, material in backs) for _, _, (material, page, colour, _) in parts]
     slots = sorted(set(slot))
-    corners = np.concatenate([part[0] for part in parts])
+    corners = np.concatenate([apart(part[0]) if own[3] else part[0] for part, own in zip(parts, slot)])
     uvs = np.concatenate([part[1] for part in parts])
     slot_of = np.concatenate([np.full(len(part[0]), slots.index(own)) for part, own in zip(parts, slot)])
     edges = corners[:, 1:] - corners[:, :1]
     real = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 0
     mesh = make_mesh(corners[real], uvs[real], slot_of[real])
     shines = False
-    for material, page, colour in slots:
+    for material, page, colour, is_twin in slots:
         look = Material(glb.gltf, None if material < 0 else material, colour)
         shines = shines or look.nits.max() > 0
-        mesh.materials.append(make_material(f"{material}.{page}", look, images[page] if page >= 0 else spare))
+        image = images[page] if page >= 0 else spare
+        mesh.materials.append(make_material(f"{material}.{page}", look, image, is_twin))
     if not shines:
         raise ValueError("no surface shines")
     return images
@@ -298,7 +323,7 @@ def write_pfm(path, image):
 def bake(samples, images, folder):
     bpy.context.scene.cycles.samples = samples
     start = time.perf_counter()
-    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=0, use_clear=True)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT", "COLOR"}, margin=0, use_clear=True)
     seconds = time.perf_counter() - start
     pages = []
     for page, image in enumerate(images):

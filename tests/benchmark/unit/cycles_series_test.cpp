@@ -14,7 +14,7 @@
 namespace radiosity::benchmark {
 namespace {
 
-/// A mirror and brushed metal are in these rooms.
+/// A mirror, brushed metal and glass are in these rooms. Of a paper shade Cycles and the path tracer do not agree yet.
 class CyclesBakes : public testing::TestWithParam<const char*> {};
 
 TEST_P(CyclesBakes, ConvergeToThePathTracer) {
@@ -46,7 +46,8 @@ TEST_P(CyclesBakes, ConvergeToThePathTracer) {
   EXPECT_LT(std::abs(last.bias), 4.0 * last.solverRms() / std::sqrt(800.0) + 0.002);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scene, CyclesBakes, testing::Values("cornell", "room_small_mirror", "room_small_brushed"),
+INSTANTIATE_TEST_SUITE_P(Scene, CyclesBakes,
+                         testing::Values("cornell", "room_small_mirror", "room_small_brushed", "room_small_glass"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(CyclesSeries, WithoutTexelsThatABakeCanBeJudgedOnNothingIsBaked) {
