@@ -26,6 +26,10 @@ CASES = {
     "4K sky": ("room_small_open", ["--sky", "SKY4K"], "even sky"),
 }
 
+# Where paths find light so seldom that 4,096 leave half of it to chance: points, and paths for each. Of what remains,
+# points have a noise of 7 %, which is most of their p95.
+JUDGED = {"paper shade": ("400", "131072")}
+
 
 def write_sky(path, width=4096, height=2048):
     """A Radiance picture of a clear sky with a sun of half a degree, run-length encoded row by row."""
@@ -75,11 +79,12 @@ def solve(build, scene, folder, error, arguments):
     return seconds, json.loads((folder / "report.json").read_text())
 
 
-def judge(build, scene, folder, samples, arguments):
+def judge(build, scene, folder, judged, arguments):
     """The lit file has the sky that was chosen; else light is traced in the scene as it was."""
     traced = [] if "--sky" in arguments else [build / f"scenes/{scene}.glb"]
+    points, samples = judged
     command = [build / "tests/accuracy/compare_lightmap", folder / "lit.glb", *traced, "--points-only", "--json",
-               "--points", "3000", "--reference-samples", samples, "--references", build / "references"]
+               "--points", points, "--reference-samples", samples, "--references", build / "references"]
     run = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=True)
     return json.loads(run.stdout)
 
@@ -94,7 +99,7 @@ def measure(name, build, options, folder):
             times_of_twin.append(solve(build, CASES[twin][0], folder, options.error, [])[0])
         seconds, report = solve(build, scene, folder, options.error, arguments)
         times.append(seconds)
-    found = judge(build, scene, folder, options.samples, arguments)
+    found = judge(build, scene, folder, JUDGED.get(name, ("3000", options.samples)), arguments)
     seconds = statistics.median(times)
     return {"name": name, "scene": scene, "seconds": seconds,
             "ofTwin": seconds / statistics.median(times_of_twin) if twin else None,

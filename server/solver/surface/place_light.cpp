@@ -34,10 +34,13 @@ constexpr std::uint32_t kRaysOfLook = 2;
 constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
 constexpr std::size_t kMostSteps = 8;
+/// Rays in all directions for each look at what is far brighter than the rest.
+constexpr std::uint32_t kRaysALook = 2;
 constexpr std::uint64_t kSpreadSeed = 0x5bd1e995;
 /// Shadow rays for that, at most: half a second of one core.
 constexpr std::size_t kMostSpreadLooks = 500'000;
-/// What a way in single precision is sent to is known to so much (unit box).
+/// What a way in single precision is sent to is known to so much (unit box), times what the cosine there makes of it:
+/// rays start a little before their places.
 constexpr double kNearEnd = 1e-5;
 
 float strongest(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}); }
@@ -141,6 +144,7 @@ void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<
     radiosity_[leaf.to] += passed_[leaf.to];
     if (!off_.empty()) off_[leaf.to] += 0.5F * leaf.transmittance * difference[node];
   }
+  bright_ = BrightLeaves::find(*rays_, radiosity_, mirrors_.get());
 }
 
 PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) const {
@@ -176,6 +180,7 @@ std::uint64_t PlaceLight::looksAPoint() const {
 
 /// Rays are drawn by the cosine with the geometric normal, and count by that with the other.
 PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const {
+  const SampleCounts counts{rays, bright_ ? std::max(1U, rays / kRaysALook) : 0};
   const Sobol4 draws(key);
   RayOrder order;
   for (std::uint32_t k = 0; k < rays; ++k) order.add(k, draws(k));
@@ -198,12 +203,41 @@ PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, 
       const auto of_ray = mixKeys(key, order[first + i].number);
       LeafRays::Place end;
       const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
-      sum.light += weight * (leaving(value, end, of_ray, kMostSteps) +
-                             alongMirrors({value, end, direction[i], of_ray, kMostSteps}));
+      double share = weight / rays;
+      if (bright_ && value == end.value && value < radiosity_.size() && bright_->density(value) > 0.0)
+        share = counts.weight(cosine, glm::dot(spot.shading, direction[i]), -glm::dot(end.normal, direction[i]),
+                              glm::distance(end.position, spot.place.position), bright_->density(value));
+      sum.light += share * (leaving(value, end, of_ray, kMostSteps) +
+                            alongMirrors({value, end, direction[i], of_ray, kMostSteps}));
       if (!off_.empty() && value < off_.size()) sum.off += weight * glm::dvec3(off_[value]);
     }
   }
-  return {sum.light / static_cast<double>(rays), sum.off / static_cast<double>(rays)};
+  if (bright_) sum.light += fromBright(spot, mixKeys(key, 8), counts);
+  return {sum.light, sum.off / static_cast<double>(rays)};
+}
+
+/// What rays in all directions would seldom meet, by looks at some of its places.
+glm::dvec3 PlaceLight::fromBright(const Spot& spot, std::uint64_t key, const SampleCounts& counts) const {
+  const Sobol4 draws(key);
+  glm::dvec3 sum(0.0);
+  for (std::uint32_t k = 0; k < counts.looks; ++k) {
+    const auto draw = draws(k);
+    const auto there = bright_->draw(*rays_, draw.x, {draw.y, draw.z});
+    const auto way = there.position - spot.place.position;
+    const double length = glm::length(way);
+    if (!(length > kNearEnd)) continue;
+    const auto direction = way / length;
+    const double cosine = glm::dot(spot.place.normal, direction), leaves = -glm::dot(there.normal, direction);
+    const double shading = glm::dot(spot.shading, direction);
+    if (cosine <= 0.0 || leaves <= 0.0 || shading <= 0.0) continue;
+    const auto of_look = mixKeys(key, k);
+    LeafRays::Place end;
+    const auto value = rays_->see(spot.place, direction, of_look, end);
+    if (value != there.value || leaves * glm::distance(end.position, there.position) > kNearEnd) continue;
+    sum += counts.weight(cosine, shading, leaves, length, bright_->density(value)) *
+           leaving(value, end, of_look, kMostSteps);
+  }
+  return sum;
 }
 
 /// By one ray.
@@ -425,7 +459,8 @@ bool PlaceLight::isOpen(const LeafRays::Place& from, const glm::dvec3& to, const
   LeafRays::Place end;
   const auto value = rays_->see(from, way / length, key, end);
   if (LeafRays::isSky(value)) return true;
-  return glm::distance(end.position, from.position) >= length - kNearEnd;
+  const double leaves = normal == glm::dvec3(0.0) ? 1.0 : -glm::dot(normal, way) / length;
+  return leaves * (length - glm::distance(end.position, from.position)) <= kNearEnd;
 }
 
 }  // namespace radiosity::solver

@@ -22,6 +22,7 @@
 #include "server/solver/patches/passing.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
+#include "server/solver/surface/bright_leaves.h"
 
 namespace radiosity::solver {
 
@@ -59,8 +60,9 @@ class PlaceLight {
   [[nodiscard]] static Spot spotAt(const glm::dvec3& position, const glm::dvec3& normal) {
     return {{position, normal}, normal, {}};
   }
-  /// Irradiance, lux. The same key gives the same bits. Cost: kRays rays, and of each lamp some tens more where it is
-  /// seen in part; of more than kEachLamp of them 64 in all.
+  /// Irradiance, lux. The same key gives the same bits. Cost: kRays rays, half as many again where some leaves are far
+  /// brighter than others, and of each lamp some tens more where it is seen in part; of more than kEachLamp of them 64
+  /// in all.
   [[nodiscard]] glm::dvec3 arriving(const Spot& spot, std::uint64_t key) const;
 
   /// The same by so many rays, in parts, and by kMostLooks looks at every lamp, so that several tell the variance even
@@ -90,6 +92,7 @@ class PlaceLight {
     glm::dvec3 light{0.0}, off{0.0};
   };
   [[nodiscard]] Gathered reflected(const Spot& spot, std::uint64_t key, std::uint32_t rays) const;
+  [[nodiscard]] glm::dvec3 fromBright(const Spot& spot, std::uint64_t key, const SampleCounts& counts) const;
   /// What a ray met, which travelled along `direction`; `steps`: it goes on from leaves that something cuts so often.
   struct Met {
     std::uint32_t value;
@@ -134,8 +137,9 @@ class PlaceLight {
   /// By leaf value, lm/m^2: what shines and is no lamp of these, and what is reflected of what arrives.
   std::vector<glm::vec3> emission_, reflectance_, radiosity_;
   std::vector<PassingLeaf> passing_;
-  std::vector<glm::vec3> passed_;  ///< of radiosity_, what came through translucent leaves; empty: nothing does
-  std::vector<glm::vec3> off_;     ///< what radiosity_ is off by; empty: not known
+  std::vector<glm::vec3> passed_;       ///< of radiosity_, what came through translucent leaves; empty: nothing does
+  std::vector<glm::vec3> off_;          ///< what radiosity_ is off by; empty: not known
+  std::optional<BrightLeaves> bright_;  ///< by radiosity_; nothing: rays meet what there is
   std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
   std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
   Images lamp_images_, source_images_;
