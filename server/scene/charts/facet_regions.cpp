@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kMostRegions = 256, kMostHidden = 1024;
 /// Pairs of pieces to be kept apart: each is asked of for each edge.
 constexpr std::size_t kMostApart = 2'000;
-/// Bilinear lookups read texels so far away, in texels.
+/// Pieces that are narrower, in texels, hold no texel that bilinear lookups around it would leave alone.
 constexpr double kNarrowPiece = 1.5;
 
 /// Pieces joined to regions, step by step.

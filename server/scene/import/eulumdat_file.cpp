@@ -9,7 +9,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kSumOff = 0.05;
+constexpr double kStatedOff = 0.05;
 constexpr std::size_t kMostLampSets = 20;  // the format's own limit
 constexpr std::size_t kDirectRatios = 10;
 constexpr double kSameDegrees = 1e-3;
@@ -29,7 +29,7 @@ class EulumdatFile {
     if (const auto done = readWeb(); !done) return tl::unexpected(done.error());
     // Of this format the luminaire's own share of the lamps' light is stated.
     const double stated = lumens_ * output_ratio_;
-    if (stated > 0.0 && std::abs(file_.web.lumens - stated) > kSumOff * stated)
+    if (stated > 0.0 && std::abs(file_.web.lumens - stated) > kStatedOff * stated)
       file_.warnings.push_back("its web sends " + lumensText(file_.web.lumens) +
                                ", but its lamps and output ratio say " + lumensText(stated));
     return std::move(file_);

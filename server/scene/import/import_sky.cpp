@@ -28,7 +28,7 @@ constexpr const char* kSky = "/extras/radiositySky";
 constexpr double kMostTurn = 1e4, kMostStrength = 1e9, kMostWatts = 2000.0, kMostLux = 1e6;
 constexpr double kLeastTurbidity = 1.0, kMostTurbidity = 12.0, kUsualTurbidity = 3.0, kUsualGround = 0.2;
 /// Of a sun, degrees: what is wider is a sky.
-constexpr double kWidestDisc = 90.0;
+constexpr double kMostSunAngle = 90.0;
 
 /// What an environment of an extension is known by: its own numbers, and its pictures. Those that are kept with it do
 /// not go, so that no other has their addresses.
@@ -267,7 +267,7 @@ class SkyReader {
     const auto direct = number(json, pointer, {"direct", 0.0, most}, -1.0);
     const auto turbidity = number(json, pointer, {"turbidity", kLeastTurbidity, kMostTurbidity}, kUsualTurbidity);
     const auto ground = number(json, pointer, {"ground", 0.0, 1.0}, kUsualGround);
-    const auto diameter = number(json, pointer, {"sunAngle", 0.0, kWidestDisc}, kSunDegrees);
+    const auto diameter = number(json, pointer, {"sunAngle", 0.0, kMostSunAngle}, kSunDegrees);
     for (const auto* read : {&diffuse, &direct, &turbidity, &ground, &diameter})
       if (!*read) return tl::unexpected(read->error());
     if (*diffuse >= 0.0) into.diffuse = *diffuse;

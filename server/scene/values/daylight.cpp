@@ -7,11 +7,12 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "server/scene/values/degree.h"
+
 namespace radiosity::scene {
 namespace {
 
 using std::numbers::pi;
-constexpr double kDegree = pi / 180.0;
 /// Of pictures of the models, which vary slowly: 0.7 degrees.
 constexpr std::size_t kWidth = 512, kHeight = 256;
 /// Cosine of the zenith angle at the horizon, where gradations have none.

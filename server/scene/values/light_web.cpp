@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "server/scene/values/degree.h"
+
 namespace radiosity::scene {
 namespace {
-
-constexpr double kWebDegree = std::numbers::pi / 180.0;
 
 /// Between two neighbours of a list: `part` of the way from the first.
 struct Between {
@@ -38,8 +38,7 @@ Between findAround(std::span<const float> azimuths, float at) {
 double polarIntegral(std::span<const float> polar, std::span<const float> candela) {
   double sum = 0.0;
   for (std::size_t i = 1; i < polar.size(); ++i) {
-    const double low = kWebDegree * static_cast<double>(polar[i - 1]),
-                 high = kWebDegree * static_cast<double>(polar[i]);
+    const double low = kDegree * static_cast<double>(polar[i - 1]), high = kDegree * static_cast<double>(polar[i]);
     const double width = high - low, whole = std::cos(low) - std::cos(high);
     const double rising = (std::sin(high) - std::sin(low) - width * std::cos(high)) / width;
     const auto first = static_cast<double>(candela[i - 1]), second = static_cast<double>(candela[i]);
@@ -57,7 +56,7 @@ double lumensOf(std::span<const float> polar, std::span<const float> azimuth, st
   double sum = 0.0;
   for (std::size_t a = 1; a < azimuth.size(); ++a) {
     const double here = column(a);
-    sum += 0.5 * (before + here) * kWebDegree * static_cast<double>(azimuth[a] - azimuth[a - 1]);
+    sum += 0.5 * (before + here) * kDegree * static_cast<double>(azimuth[a] - azimuth[a - 1]);
     before = here;
   }
   return sum;

@@ -6,10 +6,10 @@
 #include <numeric>
 #include <utility>
 
+#include "server/scene/values/degree.h"
+
 namespace radiosity::scene {
 namespace {
-
-constexpr double kRadian = std::numbers::pi / 180.0;
 
 /// The step of an ascending list of sums in which `at` lies, and how far into the step.
 struct Step {
@@ -48,7 +48,7 @@ WebDirections::WebDirections(std::span<const float> table) {
     double until = 0.0;
     for (const double ring : here) until_row_.push_back(static_cast<float>(sum > 0.0 ? (until += ring) / sum : 0.0));
     const double turn =
-        azimuths > 1 ? kRadian * static_cast<double>(azimuth_[next] - azimuth_[column]) : 2.0 * std::numbers::pi;
+        azimuths > 1 ? kDegree * static_cast<double>(azimuth_[next] - azimuth_[column]) : 2.0 * std::numbers::pi;
     until_column_.push_back(lumens += sum * turn);
     here = std::move(there);
   }
@@ -69,8 +69,8 @@ std::vector<double> WebDirections::rings(std::size_t azimuth, std::span<const Ri
 std::vector<WebDirections::RingPart> WebDirections::ringParts(std::span<const float> polar_deg) {
   std::vector<RingPart> parts;
   for (std::size_t row = 0; row + 1 < polar_deg.size(); ++row) {
-    const double low = kRadian * static_cast<double>(polar_deg[row]);
-    const double high = kRadian * static_cast<double>(polar_deg[row + 1]);
+    const double low = kDegree * static_cast<double>(polar_deg[row]);
+    const double high = kDegree * static_cast<double>(polar_deg[row + 1]);
     const double width = high - low;
     parts.push_back(
         {std::cos(low) - std::cos(high), (std::sin(high) - std::sin(low) - width * std::cos(high)) / width});
@@ -88,11 +88,11 @@ WebDirections::Direction WebDirections::at(const glm::dvec2& at) const {
   const auto first = static_cast<double>(azimuth_[column.index]);
   const auto next = std::min(column.index + 1, azimuth_.size() - 1);
   const double turn = azimuth_.size() > 1 ? static_cast<double>(azimuth_[next]) - first : 360.0;
-  const double low = kRadian * static_cast<double>(polar_[row.index]);
-  const double high = kRadian * static_cast<double>(polar_[row.index + 1]);
+  const double low = kDegree * static_cast<double>(polar_[row.index]);
+  const double high = kDegree * static_cast<double>(polar_[row.index + 1]);
   const double cosine = std::cos(low) + row.part * (std::cos(high) - std::cos(low));
   Direction drawn{std::clamp(std::acos(std::clamp(cosine, -1.0, 1.0)), low, high),
-                  kRadian * (first + column.part * turn), 0.0};
+                  kDegree * (first + column.part * turn), 0.0};
   const double along = high > low ? (drawn.polar_rad - low) / (high - low) : 0.0;
   const auto candela = [&](std::size_t azimuth) {
     const auto* values = candela_.data() + azimuth * polar_.size() + row.index;
@@ -100,7 +100,7 @@ WebDirections::Direction WebDirections::at(const glm::dvec2& at) const {
   };
   const double here = candela(column.index) + column.part * (candela(next) - candela(column.index));
   const double flux = column.height * row.height;
-  if (flux > 0.0) drawn.weight = here * (std::cos(low) - std::cos(high)) * kRadian * turn / flux;
+  if (flux > 0.0) drawn.weight = here * (std::cos(low) - std::cos(high)) * kDegree * turn / flux;
   return drawn;
 }
 

@@ -21,7 +21,7 @@ constexpr std::uint32_t kBackRays = 4096;
 constexpr std::uint64_t kKey = 0x10573A11;  ///< of samples
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-double channelSum(const glm::vec3& v) {
+double lightSum(const glm::vec3& v) {
   return static_cast<double>(v.x) + static_cast<double>(v.y) + static_cast<double>(v.z);
 }
 
@@ -165,7 +165,7 @@ LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
     const auto emission = materials_.emission.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       leaves.add(side.first_value + leaf,
-                 channelSum(emission[leaf]) * static_cast<double>(patches_.node_area[side.first_node + leaf]));
+                 lightSum(emission[leaf]) * static_cast<double>(patches_.node_area[side.first_node + leaf]));
   }
   if (leaves.empty()) return fate;
   const auto key = mixKeys(kKey, instance);
@@ -200,7 +200,7 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
       auto light = emission[leaf] + reflectance[leaf] * irradiance[node];
       if (side.other != scene::kNone && materials_.transmittance.sideCount() > 0)
         light += materials_.transmittance.side(side.number)[leaf] * irradiance[sides_[side.other].first_node + leaf];
-      senders.add(number, channelSum(light) * static_cast<double>(patches_.node_area[node]));
+      senders.add(number, lightSum(light) * static_cast<double>(patches_.node_area[node]));
     }
   }
   const auto first_light = number;

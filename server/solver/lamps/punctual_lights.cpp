@@ -14,6 +14,7 @@
 #include "server/solver/lamps/lamp_of_light.h"
 #include "server/solver/lamps/sky_sources.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/patches/unshot_pyramid.h"
 
 namespace radiosity::solver {
 namespace {
@@ -41,8 +42,6 @@ std::uint32_t pixelsForLeaves(const scene::PatchScene& patches, float extent) {
   while (pixels < 4096 && pixels < wanted) pixels *= 2;
   return pixels;
 }
-
-double channelSum(const glm::dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 std::array<double, 3> channels(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 

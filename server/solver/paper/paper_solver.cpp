@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/solver/math/sampling.h"
+#include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/transport/node_shots.h"
 
 namespace radiosity::solver {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "server/solver/patches/unshot_pyramid.h"
+
 namespace radiosity::solver {
 namespace {
 

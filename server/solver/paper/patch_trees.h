@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -15,11 +14,6 @@
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
-
-/// Of all channels, whatever their signs.
-[[nodiscard]] inline double channelSum(const glm::dvec3& value) {
-  return std::abs(value.x) + std::abs(value.y) + std::abs(value.z);
-}
 
 class PatchTrees {
  public:

@@ -7,6 +7,7 @@
 namespace radiosity::solver {
 
 float channelSum(const glm::vec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+double channelSum(const glm::dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 void UnshotPyramid::clear() {
   giveBack(flux_);

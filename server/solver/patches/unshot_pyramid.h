@@ -11,6 +11,7 @@ namespace radiosity::solver {
 
 /// Sum of the magnitudes of the channels.
 [[nodiscard]] float channelSum(const glm::vec3& v);
+[[nodiscard]] double channelSum(const glm::dvec3& v);
 
 class UnshotPyramid {
  public:

@@ -21,8 +21,8 @@ constexpr std::size_t kFew = 256, kInTurn = 128;
 /// few enough to be shared out between workers.
 constexpr std::uint32_t kPointsAShot = 8;
 
-double channelSum(const glm::dvec3& v) { return v.x + v.y + v.z; }
-double powerOf(const LightPolygon& light) { return light.area * channelSum(glm::dvec3(light.emission)); }
+double lightSum(const glm::dvec3& v) { return v.x + v.y + v.z; }
+double powerOf(const LightPolygon& light) { return light.area * lightSum(glm::dvec3(light.emission)); }
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void DirectShots::takeTurns(std::vector<ShotLight> lights) {
 }
 
 double DirectShots::powerOf(const ShotLight& light, std::size_t half) const {
-  return light.area * channelSum(glm::abs(light.undelivered(rounds_, half)));
+  return light.area * lightSum(glm::abs(light.undelivered(rounds_, half)));
 }
 
 void DirectShots::startRound(std::uint32_t rounds) {

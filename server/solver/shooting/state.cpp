@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/solver/patches/unshot_pyramid.h"
+
 #include "common/check.h"
 
 namespace radiosity::solver {
 namespace {
-
-float channelSum(const glm::vec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 void addTo(Flux3& sum, const Flux3& term) {
   for (std::size_t c = 0; c < 3; ++c) sum[c] += term[c];

@@ -16,8 +16,8 @@ constexpr double kLeastPart = 0.02;
 
 }  // namespace
 
-std::optional<BrightLeaves> BrightLeaves::find(const LeafRays& rays, std::span<const glm::vec3> radiosity,
-                                               const SpecularLeaves* mirrors) {
+std::optional<BrightLeaves> BrightLeaves::find(const scene::PatchScene& patches, const LeafRays& rays,
+                                               std::span<const glm::vec3> radiosity, const SpecularLeaves* mirrors) {
   double area = 0.0, flux = 0.0, bright_flux = 0.0;
   const auto fluxOf = [&](std::uint32_t value) {
     return rays.areaOf(value) * static_cast<double>(channelSum(radiosity[value]));
@@ -26,11 +26,14 @@ std::optional<BrightLeaves> BrightLeaves::find(const LeafRays& rays, std::span<c
     area += rays.areaOf(value);
     flux += fluxOf(value);
   }
+  if (!(flux > 0.0)) return std::nullopt;
   BrightLeaves bright;
   for (std::uint32_t value = 0; value < radiosity.size(); ++value) {
     if (static_cast<double>(channelSum(radiosity[value])) * area <= kBright * flux || rays.areaOf(value) <= 0.0)
       continue;
     if (mirrors != nullptr && mirrors->has(value)) continue;  // which show other places
+    // Places on these are drawn where rays pass, too.
+    if (patches.surfaces[rays.sideOf(value).surface].see_through) continue;
     if (rays.isCut(value)) continue;  // of which spots are drawn, and rays find all that is left
     bright.values_.push_back(value);
     bright.up_to_.push_back(bright_flux += fluxOf(value));

@@ -16,14 +16,16 @@ namespace radiosity::solver {
 
 class BrightLeaves {
  public:
-  /// `radiosity`: lm/m^2, by leaf value; `mirrors` may be null. Nothing where few of them are so bright, or all are
-  /// weak together. O(leaves).
-  [[nodiscard]] static std::optional<BrightLeaves> find(const LeafRays& rays, std::span<const glm::vec3> radiosity,
+  /// `radiosity`: lm/m^2, by leaf value; `mirrors` may be null. Nothing where those that are so bright send next to
+  /// nothing together. O(leaves).
+  [[nodiscard]] static std::optional<BrightLeaves> find(const scene::PatchScene& patches, const LeafRays& rays,
+                                                        std::span<const glm::vec3> radiosity,
                                                         const SpecularLeaves* mirrors);
 
   /// A place of one of them, drawn by flux: `u` draws the leaf, `at` where on it, both in [0, 1).
   [[nodiscard]] LeafRays::Place draw(const LeafRays& rays, double u, const glm::dvec2& at) const;
-  /// Chance of a place there to be drawn, by area (unit box); 0 on all other leaves.
+  /// Chance of a place there to be drawn, by area (unit box); 0 on all other leaves. Of leaves of which a part is
+  /// hidden spots are drawn, which stand for that.
   [[nodiscard]] double density(std::uint32_t value) const { return density_[value]; }
 
  private:

@@ -36,6 +36,8 @@ constexpr double kLift = 2e-6;
 constexpr std::size_t kMostSteps = 8;
 /// Rays in all directions for each look at what is far brighter than the rest.
 constexpr std::uint32_t kRaysALook = 2;
+/// No ray has this number.
+constexpr std::uint64_t kLookKey = ~std::uint64_t{0};
 constexpr std::uint64_t kSpreadSeed = 0x5bd1e995;
 /// Shadow rays for that, at most: half a second of one core.
 constexpr std::size_t kMostSpreadLooks = 500'000;
@@ -144,7 +146,7 @@ void PlaceLight::setIrradiance(std::span<const glm::vec3> irradiance, std::span<
     radiosity_[leaf.to] += passed_[leaf.to];
     if (!off_.empty()) off_[leaf.to] += 0.5F * leaf.transmittance * difference[node];
   }
-  bright_ = BrightLeaves::find(*rays_, radiosity_, mirrors_.get());
+  bright_ = BrightLeaves::find(patches_, *rays_, radiosity_, mirrors_.get());
 }
 
 PlaceLight::Spot PlaceLight::spotOn(std::uint32_t value, const glm::vec2& at) const {
@@ -171,7 +173,7 @@ PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, s
 }
 
 std::uint64_t PlaceLight::looksAPoint() const {
-  std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0);
+  std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0) + (bright_ ? kRays / kRaysALook : 0);
   for (const auto& source : sources_) looks += source.kind == PunctualLights::Source::Kind::kLamp ? kLampLooks : 1;
   for (const auto* images : {lamp_images_.images.get(), source_images_.images.get()})
     if (images != nullptr) looks += std::uint64_t{kRaysOfLook} * kAllLooks * images->images().size();
@@ -212,31 +214,48 @@ PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, 
       if (!off_.empty() && value < off_.size()) sum.off += weight * glm::dvec3(off_[value]);
     }
   }
-  if (bright_) sum.light += fromBright(spot, mixKeys(key, 8), counts);
+  if (bright_) sum.light += fromBright(spot, mixKeys(key, kLookKey), counts);
   return {sum.light, sum.off / static_cast<double>(rays)};
 }
 
 /// What rays in all directions would seldom meet, by looks at some of its places.
 glm::dvec3 PlaceLight::fromBright(const Spot& spot, std::uint64_t key, const SampleCounts& counts) const {
   const Sobol4 draws(key);
+  std::array<LeafRays::Place, geometry::kPacket> from, there;
+  from.fill(spot.place);
+  std::array<glm::dvec3, geometry::kPacket> direction;
+  std::array<std::uint64_t, geometry::kPacket> of_look{};
+  std::array<geometry::Hit, geometry::kPacket> hit;
+  std::size_t together = 0;
   glm::dvec3 sum(0.0);
+  const auto look = [&] {
+    rays_->meetFirst(std::span(from).first(together), std::span(direction).first(together),
+                     std::span(hit).first(together));
+    for (std::size_t i = 0; i < together; ++i) {
+      LeafRays::Place end;
+      const auto value = rays_->see(spot.place, direction[i], of_look[i], end, &hit[i]);
+      const double leaves = -glm::dot(there[i].normal, direction[i]);
+      // Rays start a little before their places, and may end beyond the edge of the leaf.
+      if (value >= radiosity_.size() || rays_->sideOf(value).number != rays_->sideOf(there[i].value).number) continue;
+      if (leaves * glm::distance(end.position, there[i].position) > kNearEnd) continue;
+      sum += counts.weight(glm::dot(spot.place.normal, direction[i]), glm::dot(spot.shading, direction[i]), leaves,
+                           glm::distance(there[i].position, spot.place.position), bright_->density(there[i].value)) *
+             glm::dvec3(radiosity_[there[i].value]);
+    }
+    together = 0;
+  };
   for (std::uint32_t k = 0; k < counts.looks; ++k) {
     const auto draw = draws(k);
-    const auto there = bright_->draw(*rays_, draw.x, {draw.y, draw.z});
-    const auto way = there.position - spot.place.position;
+    there[together] = bright_->draw(*rays_, draw.x, {draw.y, draw.z});
+    const auto way = there[together].position - spot.place.position;
     const double length = glm::length(way);
-    if (!(length > kNearEnd)) continue;
-    const auto direction = way / length;
-    const double cosine = glm::dot(spot.place.normal, direction), leaves = -glm::dot(there.normal, direction);
-    const double shading = glm::dot(spot.shading, direction);
-    if (cosine <= 0.0 || leaves <= 0.0 || shading <= 0.0) continue;
-    const auto of_look = mixKeys(key, k);
-    LeafRays::Place end;
-    const auto value = rays_->see(spot.place, direction, of_look, end);
-    if (value != there.value || leaves * glm::distance(end.position, there.position) > kNearEnd) continue;
-    sum += counts.weight(cosine, shading, leaves, length, bright_->density(value)) *
-           leaving(value, end, of_look, kMostSteps);
+    if (!(length > kNearEnd) || glm::dot(there[together].normal, way) >= 0.0) continue;
+    if (glm::dot(spot.place.normal, way) <= 0.0 || glm::dot(spot.shading, way) <= 0.0) continue;
+    direction[together] = way / length;
+    of_look[together] = mixKeys(key, k);
+    if (++together == geometry::kPacket) look();
   }
+  if (together > 0) look();
   return sum;
 }
 
@@ -460,7 +479,7 @@ bool PlaceLight::isOpen(const LeafRays::Place& from, const glm::dvec3& to, const
   const auto value = rays_->see(from, way / length, key, end);
   if (LeafRays::isSky(value)) return true;
   const double leaves = normal == glm::dvec3(0.0) ? 1.0 : -glm::dot(normal, way) / length;
-  return leaves * (length - glm::distance(end.position, from.position)) <= kNearEnd;
+  return leaves > 0.0 && leaves * (length - glm::distance(end.position, from.position)) <= kNearEnd;
 }
 
 }  // namespace radiosity::solver

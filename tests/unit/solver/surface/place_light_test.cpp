@@ -104,6 +104,35 @@ TEST_F(BrightPlate, CountsByTheShadingNormal) {
   EXPECT_NEAR(estimates(spot).mean.x / exact(spot.place.position, spot.shading).x, 1.0, 0.01);
 }
 
+TEST_F(BrightPlate, CountsByTheCosinesOfEitherEnd) {
+  for (const auto& normal : {glm::dvec3(0.6, 0.8, 0.0), glm::dvec3(-0.3, 0.2, 0.5)}) {
+    const auto spot = PlaceLight::spotAt({0.1, 0.0, -0.3}, glm::normalize(normal));
+    EXPECT_NEAR(estimates(spot).mean.x / exact(spot.place.position, spot.place.normal).x, 1.0, 0.01) << normal.x;
+  }
+}
+
+// Places there are drawn where rays pass, too, so that rays alone find what such leaves send.
+TEST_F(BrightPlate, IsNotLookedForWhereOneCanSeeThroughIt) {
+  auto& patches = *scene_.patches;
+  const auto sides = makeSides(patches);
+  std::vector<glm::vec3> radiosity(sides.back().first_value + sides.back().leaf_count);
+  radiosity[sides[1].first_value + 5] = glm::vec3(100.0F);
+  const auto isFound = [&] { return BrightLeaves::find(patches, LeafRays(patches, sides), radiosity, nullptr); };
+  const auto found = isFound();
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->density(sides[1].first_value + 5), 1.0 / LeafRays(patches, sides).areaOf(sides[1].first_value + 5),
+              1e-3);
+  EXPECT_EQ(found->density(sides[1].first_value + 6), 0.0);
+  patches.surfaces[sides[1].surface].see_through = true;
+  EXPECT_FALSE(isFound());
+}
+
+TEST_F(BrightPlate, IsTheSameForTheSameKey) {
+  const auto spot = PlaceLight::spotAt({0.1, -0.4, 0.05}, {0.0, 1.0, 0.0});
+  EXPECT_EQ(light_->arriving(spot, 5), light_->arriving(spot, 5));
+  EXPECT_NE(light_->arriving(spot, 5), light_->arriving(spot, 6));
+}
+
 TEST_F(BrightPlate, BringsNothingToWhatFacesAway) {
   EXPECT_EQ(estimates(PlaceLight::spotAt({0.1, 0.0, 0.05}, {0.0, -1.0, 0.0})).mean.x, 0.0);
 }
