@@ -8,6 +8,7 @@
 
 #include "tests/accuracy/closed_form.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/shading.h"
 
 namespace radiosity::accuracy {
 namespace {
@@ -39,13 +40,35 @@ std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& opt
   return texels;
 }
 
+/// Irradiance of texels, as lightmaps show it. A texel is translucent if all of it is.
+std::vector<oracle::Irradiance> meansOf(const oracle::TriangleScene& scene, const std::vector<Texel>& texels,
+                                        const ReferenceOptions& options) {
+  const auto isTranslucent = [&](const oracle::Footprint& footprint) {
+    return std::ranges::all_of(footprint.pieces, [&](const auto& piece) {
+      return piece.triangle < scene.triangles.size() && scene.triangles[piece.triangle].diffuse_transmission > 0.0;
+    });
+  };
+  std::vector<oracle::Footprint> footprints, beyond;
+  for (const auto& texel : texels) {
+    footprints.push_back(texel.footprint);
+    beyond.push_back(isTranslucent(texel.footprint) ? turnedOver(texel.footprint) : oracle::Footprint());
+  }
+  const oracle::PathTracer tracer(scene);
+  auto means = tracer.irradiance(footprints, {.samples = options.texel_samples, .seed = options.seed + 2});
+  const auto behind = tracer.irradiance(beyond, {.samples = options.texel_samples, .seed = options.seed + 3});
+  const oracle::Shading shading(scene);
+  for (std::size_t i = 0; i < texels.size(); ++i) {
+    if (beyond[i].pieces.empty()) continue;
+    const auto& piece = footprints[i].pieces.front();
+    const auto middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
+    means[i] = shownThrough(shading, scene.triangles[piece.triangle], middle, means[i], behind[i]);
+  }
+  return means;
+}
+
 void addTexels(const LitScene& lit, const ReferenceOptions& options, Reference& reference) {
   const auto texels = chooseTexels(lit, options, reference.cut_area);
-  std::vector<oracle::Footprint> footprints;
-  footprints.reserve(texels.size());
-  for (const auto& texel : texels) footprints.push_back(texel.footprint);
-  const auto means = oracle::PathTracer(lit.traced())
-                         .irradiance(footprints, {.samples = options.texel_samples, .seed = options.seed + 2});
+  const auto means = meansOf(lit.traced(), texels, options);
   double hidden = 0.0, all = 0.0;
   for (std::size_t i = 0; i < texels.size(); ++i) {
     const auto& texel = texels[i];

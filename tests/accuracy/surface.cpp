@@ -83,7 +83,16 @@ struct Sums {
   }
 };
 
-/// As lightmaps show a translucent place: from its own light, and that of its other side.
+}  // namespace
+
+oracle::Footprint turnedOver(oracle::Footprint footprint) {
+  for (auto& piece : footprint.pieces) {
+    piece.normal = -piece.normal;
+    for (auto& corner : piece.shading) corner = -corner;
+  }
+  return footprint;
+}
+
 oracle::Irradiance shownThrough(const oracle::Shading& shading, const oracle::Triangle& triangle,
                                 const glm::dvec3& position, const oracle::Irradiance& own,
                                 const oracle::Irradiance& beyond) {
@@ -97,8 +106,6 @@ oracle::Irradiance shownThrough(const oracle::Shading& shading, const oracle::Tr
   shown.standard_error = glm::sqrt(a * a + b * b);
   return shown;
 }
-
-}  // namespace
 
 std::vector<SurfacePoint> makePoints(const oracle::TriangleScene& scene, std::size_t count, std::uint32_t samples,
                                      std::uint64_t seed) {
@@ -115,11 +122,7 @@ std::vector<SurfacePoint> makePoints(const oracle::TriangleScene& scene, std::si
     footprints.push_back({{placeOn(triangle, oracle::hasTwoSides(triangle) && i % 2 == 1, random)}});
     on.push_back(static_cast<std::size_t>(&triangle - scene.triangles.data()));
     beyond.emplace_back();
-    if (triangle.diffuse_transmission <= 0.0) continue;
-    beyond.back() = footprints.back();
-    auto& piece = beyond.back().pieces.front();
-    piece.normal = -piece.normal;
-    for (auto& corner : piece.shading) corner = -corner;
+    if (triangle.diffuse_transmission > 0.0) beyond.back() = turnedOver(footprints.back());
   }
   const oracle::PathTracer tracer(scene);
   const auto traced = tracer.irradiance(footprints, {.samples = samples, .seed = seed + 1, .leave_out_buried = false});

@@ -12,6 +12,8 @@
 
 #include "tests/accuracy/lit_scene.h"
 #include "tests/oracle/error_metrics.h"
+#include "tests/oracle/path_tracer.h"
+#include "tests/oracle/shading.h"
 
 namespace radiosity::accuracy {
 
@@ -32,6 +34,13 @@ struct SurfacePoint {
 /// By area over every triangle, on both sides of double-sided ones by turns, with `samples` paths each.
 [[nodiscard]] std::vector<SurfacePoint> makePoints(const oracle::TriangleScene& scene, std::size_t count,
                                                    std::uint32_t samples, std::uint64_t seed);
+
+/// What arrives at its other side.
+[[nodiscard]] oracle::Footprint turnedOver(oracle::Footprint footprint);
+/// As lightmaps show a translucent triangle around `position`: from its own light, and that of its other side.
+[[nodiscard]] oracle::Irradiance shownThrough(const oracle::Shading& shading, const oracle::Triangle& triangle,
+                                              const glm::dvec3& position, const oracle::Irradiance& own,
+                                              const oracle::Irradiance& beyond);
 
 /// Of the mean of red, green and blue. Figures are of points where there is light; those that are dark in truth, below
 /// a hundredth of the mean, are counted, and so are the leaks among them: lit in the file by more than a twentieth of

@@ -129,6 +129,8 @@ class Material:
         self.transmittance = is_diffuse * passing * np.array(paper.get("diffuseTransmissionColorFactor", (1, 1, 1)), float)
         strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
         self.nits = strength * np.array(material.get("emissiveFactor", (0, 0, 0)), float)
+        if self.transmittance.max() > 0 and base.min() < 1e-3:
+            raise ValueError("paper whose base colour lacks a channel is not baked")
         self.double_sided = material.get("doubleSided", False) or self.is_glass
         self.passes = self.is_glass or self.transmittance.max() > 0
 
@@ -247,8 +249,13 @@ def make_mesh(corners, uvs, material_of):
     return mesh
 
 
+def keys_of(corners):
+    """The same for triangles with the same corners, whatever their order."""
+    return [tuple(sorted(tuple(corner) for corner in triangle)) for triangle in np.round(corners, 5).tolist()]
+
+
 def apart(corners):
-    """Triangles, so much farther to their front that single precision can tell."""
+    """Triangles, so much farther to their front that single precision can tell, in scenes of some tens of metres."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return corners + (2e-5 * normals / np.maximum(lengths, 1e-30))[:, None, :]
@@ -275,8 +282,15 @@ def load(path, sizes):
     spare = bpy.data.images.new("no page", 4, 4, float_buffer=True, is_data=True)
     looks = [Material(glb.gltf, material, colour) for _, _, (material, _, colour, _) in parts]
     # Sheets that pass light and lie there twice, as the lit GLB has those with light on both sides, are moved apart.
-    backs = {part[2][0] for part, look in zip(parts, looks) if part[2][3] and look.passes}
-    slot = [(-1 if material is None else material, page, colour, material in backs) for _, _, (material, page, colour, _) in parts]
+    backs = {key for part, look in zip(parts, looks) if part[2][3] and look.passes for key in keys_of(part[0])}
+    twins = []
+    for part, look in zip(parts, looks):
+        found = [key in backs for key in keys_of(part[0])] if look.passes and backs else []
+        if any(found) and not all(found):
+            raise ValueError("paper of which some triangles alone have light on both sides is not baked")
+        twins.append(any(found))
+    slot = [(-1 if material is None else material, page, colour, is_twin)
+            for (_, _, (material, page, colour, _)), is_twin in zip(parts, twins)]
     slots = sorted(set(slot))
     corners = np.concatenate([apart(part[0]) if own[3] else part[0] for part, own in zip(parts, slot)])
     uvs = np.concatenate([part[1] for part in parts])

@@ -14,7 +14,7 @@
 namespace radiosity::benchmark {
 namespace {
 
-/// A mirror, brushed metal and glass are in these rooms. Of a paper shade Cycles and the path tracer do not agree yet.
+/// A mirror, brushed metal, glass and paper are in these rooms.
 class CyclesBakes : public testing::TestWithParam<const char*> {};
 
 TEST_P(CyclesBakes, ConvergeToThePathTracer) {
@@ -30,9 +30,9 @@ TEST_P(CyclesBakes, ConvergeToThePathTracer) {
   ASSERT_NE(scene, scenes.end());
   test_scenes::writeGlb(scene->second(), folder / (name + ".glb"));
   const auto run =
-      accuracy::runSolve(RADIOSITY_CLIENT, folder / (name + ".glb"), folder, {"--error", "0.5", "--texels", "2000"});
+      accuracy::runSolve(RADIOSITY_CLIENT, folder / (name + ".glb"), folder, {"--error", "0.5", "--texels", "8000"});
   ASSERT_EQ(run.exit_code, 0) << run.last_line;  // only its charts are wanted
-  const auto lit = accuracy::readLitScene(run.output);
+  const auto lit = accuracy::readLitScene(run.output, folder / (name + ".glb"));
   const auto reference =
       accuracy::makeReference(lit, {.texel_samples = 1024, .point_samples = 8, .texels = 800, .points = 1});
   const auto series = bakeWithCycles(run.output, lit, reference, options);
@@ -47,7 +47,8 @@ TEST_P(CyclesBakes, ConvergeToThePathTracer) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scene, CyclesBakes,
-                         testing::Values("cornell", "room_small_mirror", "room_small_brushed", "room_small_glass"),
+                         testing::Values("cornell", "room_small_mirror", "room_small_brushed", "room_small_glass",
+                                         "room_small_shade"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(CyclesSeries, WithoutTexelsThatABakeCanBeJudgedOnNothingIsBaked) {
