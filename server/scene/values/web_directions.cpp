@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/scene/values/degree.h"
+#include "server/scene/values/light_web.h"
 
 namespace radiosity::scene {
 namespace {
