@@ -10,7 +10,7 @@
 namespace radiosity::accuracy {
 namespace {
 
-constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '5'};
+constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '6'};
 constexpr std::size_t kMaxRecords = 1 << 26;
 constexpr std::size_t kProbes = 16;
 constexpr std::uint32_t kProbeSamples = 64;

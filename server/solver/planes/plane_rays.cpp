@@ -71,7 +71,7 @@ bool PlaneRays::isSure(double wanted) const {
 }
 
 void PlaneRays::measure(double wanted) {
-  const auto of_round = (kRays + light_.looksAPoint()) * points_.size();
+  const auto of_round = (kRays + light_.looksAPoint(kRays)) * points_.size();
   const auto most = std::clamp<std::uint64_t>(kMostRays / of_round, kFewestRounds, kMostRounds);
   while (rounds() < std::min<std::uint64_t>(most, kLeastRounds) || (rounds() + 2 <= most && !isSure(wanted)))
     addRounds();

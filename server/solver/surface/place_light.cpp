@@ -172,8 +172,8 @@ PlaceLight::Arriving PlaceLight::arriving(const Spot& spot, std::uint64_t key, s
   return {direct(spot, mixKeys(key, 1), Looks::kAll), gathered.light, gathered.off};
 }
 
-std::uint64_t PlaceLight::looksAPoint() const {
-  std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0) + (bright_ ? kRays / kRaysALook : 0);
+std::uint64_t PlaceLight::looksAPoint(std::uint32_t rays) const {
+  std::uint64_t looks = kAllLooks * lamps_.size() + (many_ ? kDraws : 0) + (bright_ ? rays / kRaysALook : 0);
   for (const auto& source : sources_) looks += source.kind == PunctualLights::Source::Kind::kLamp ? kLampLooks : 1;
   for (const auto* images : {lamp_images_.images.get(), source_images_.images.get()})
     if (images != nullptr) looks += std::uint64_t{kRaysOfLook} * kAllLooks * images->images().size();

@@ -72,8 +72,8 @@ class PlaceLight {
     glm::dvec3 direct{0.0}, reflected{0.0}, off{0.0};
   };
   [[nodiscard]] Arriving arriving(const Spot& spot, std::uint64_t key, std::uint32_t rays) const;
-  /// Rays towards lamps that such a place takes at most.
-  [[nodiscard]] std::uint64_t looksAPoint() const;
+  /// What such a place takes beside so many rays, at most: looks at lamps and at bright leaves.
+  [[nodiscard]] std::uint64_t looksAPoint(std::uint32_t rays) const;
   /// Other irradiance and difference of the same scene, by node of level 0.
   void setIrradiance(std::span<const glm::vec3> irradiance, std::span<const glm::vec3> difference);
   /// Of the sky, lm/m^2: pi times the radiance in the middle of a cell.

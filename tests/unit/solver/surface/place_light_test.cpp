@@ -117,14 +117,14 @@ TEST_F(BrightPlate, IsNotLookedForWhereOneCanSeeThroughIt) {
   const auto sides = makeSides(patches);
   std::vector<glm::vec3> radiosity(sides.back().first_value + sides.back().leaf_count);
   radiosity[sides[1].first_value + 5] = glm::vec3(100.0F);
-  const auto isFound = [&] { return BrightLeaves::find(patches, LeafRays(patches, sides), radiosity, nullptr); };
-  const auto found = isFound();
+  const auto find = [&] { return BrightLeaves::find(patches, LeafRays(patches, sides), radiosity, nullptr); };
+  const auto found = find();
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->density(sides[1].first_value + 5), 1.0 / LeafRays(patches, sides).areaOf(sides[1].first_value + 5),
               1e-3);
   EXPECT_EQ(found->density(sides[1].first_value + 6), 0.0);
   patches.surfaces[sides[1].surface].see_through = true;
-  EXPECT_FALSE(isFound());
+  EXPECT_FALSE(find());
 }
 
 TEST_F(BrightPlate, IsTheSameForTheSameKey) {
