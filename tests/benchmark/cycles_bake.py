@@ -1,12 +1,13 @@
 """Bakes the irradiance of a lit GLB with Cycles, at rising sample counts, on the texels that the GLB itself names.
 
-    blender --background --factory-startup --python cycles_bake.py -- LIT.glb FOLDER [--seconds T] [--page-sizes WxH,...]
+    blender --background --factory-startup --python cycles_bake.py -- LIT.glb FOLDER --page-sizes WxH,...
+        [--seconds T | --samples N,...]
 
 Runs inside Blender (made with 3.4). The same triangles, TEXCOORD_1 and reflectances as the GLB has, and the same
 physics as the project's conventions: a plain Diffuse BSDF, a Principled one for metal, Translucent for paper, Transparent
 and Glossy for glass; of paper that lies there twice, turned over, light passes one; the back of a single-sided triangle is black and does not shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
 
-Sample counts grow by four for as long as the next bake should take at most T seconds. For each, every page is written as
+Sample counts grow by four for as long as the next bake should take at most T seconds, or are those named. For each, every page is written as
 FOLDER/<samples>.<page>.pfm (irradiance in lux, row 0 = v 0) and a line "bake: {JSON}" is printed: samples, seconds (of
 the bake operator: scene set-up included), pages. A GLB without light or pages ends with status 1 and the reason.
 """
@@ -352,6 +353,7 @@ def main():
     parser.add_argument("glb")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seconds", type=float, default=20.0, help="of the longest bake, about")
+    parser.add_argument("--samples", default="", help="of each bake, by commas, however long they take")
     parser.add_argument("--page-sizes", required=True, help="WxH of every page, by commas")
     arguments = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
     sizes = [tuple(int(side) for side in size.split("x")) for size in arguments.page_sizes.split(",")]
@@ -359,6 +361,10 @@ def main():
     set_up()
     images = load(arguments.glb, sizes)
     print("bake:", json.dumps({"version": bpy.app.version_string, "triangles": len(bpy.context.object.data.polygons)}), flush=True)
+    for samples in filter(None, arguments.samples.split(",")):
+        bake(int(samples), images, arguments.folder)
+    if arguments.samples:
+        return
     samples, first, last = 1, 0.0, 0.0
     while samples <= 65536 and first + 4 * (last - first) <= arguments.seconds:
         last = bake(samples, images, arguments.folder)

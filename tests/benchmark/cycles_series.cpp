@@ -67,10 +67,11 @@ CyclesSeries bakeWithCycles(const std::filesystem::path& glb, const accuracy::Li
   const auto folder = glb.parent_path() / "cycles";
   std::string sizes;
   for (const auto& page : lit.pages) sizes += fmt::format("{}{}x{}", sizes.empty() ? "" : ",", page.width, page.height);
-  const auto output = runBlender(
-      fmt::format("{} --background --factory-startup --python {} -- {} {} --seconds {:g} --page-sizes {} 2>&1",
-                  quoted(options.blender), quoted(options.bake_script.string()), quoted(glb.string()),
-                  quoted(folder.string()), options.cycles_seconds, sizes));
+  const auto effort = options.cycles_samples.empty() ? fmt::format("--seconds {:g}", options.cycles_seconds)
+                                                     : "--samples " + quoted(options.cycles_samples);
+  const auto output = runBlender(fmt::format(
+      "{} --background --factory-startup --python {} -- {} {} {} --page-sizes {} 2>&1", quoted(options.blender),
+      quoted(options.bake_script.string()), quoted(glb.string()), quoted(folder.string()), effort, sizes));
   series.start_seconds = output.seconds;
   for (const auto& line : output.lines) {
     series.version = line.value("version", series.version);

@@ -27,6 +27,7 @@ struct SeriesOptions {
   std::string blender = "blender";
   std::filesystem::path bake_script;
   double cycles_seconds = 45.0;  ///< of the longest bake, about
+  std::string cycles_samples;    ///< of each bake, by commas, however long they take; empty: what the time allows
 };
 
 struct StatedError {
