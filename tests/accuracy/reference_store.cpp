@@ -51,6 +51,12 @@ void addUse(const oracle::TextureUse& use, Hash& hash) {
   for (const auto& uv : use.uv) hash.add(uv);
 }
 
+/// Whether all light that enters goes on. References of other glass, which were kept before its texture was known and
+/// before its interface took from what it scatters, are of no use; those of this kind still hold.
+bool onlyPasses(const oracle::Triangle& triangle) {
+  return triangle.transmission >= 1.0 && triangle.passing.texture < 0 && triangle.mirror.metallic <= 0.0;
+}
+
 /// What light is traced in.
 void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
   for (const auto& triangle : scene.triangles) {
@@ -67,6 +73,7 @@ void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
     const auto& mirror = triangle.mirror;
     hash.add(mirror.metallic), hash.add(mirror.colour), hash.add(mirror.interface), hash.add(mirror.roughness);
     hash.add(mirror.attenuation);
+    if (triangle.transmission > 0.0 && !onlyPasses(triangle)) addUse(triangle.passing, hash);
   }
 }
 

@@ -64,7 +64,7 @@ struct Vertices {
   std::vector<glm::dvec2> lightmap_uvs;
   std::vector<glm::dvec4> colours;
   std::vector<glm::dvec2> base_colour, emissive, metal, specular;  ///< of the textures
-  std::vector<glm::dvec2> transmission_part, transmission_colour;
+  std::vector<glm::dvec2> passing, transmission_part, transmission_colour;
 };
 
 class Reader {
@@ -217,6 +217,7 @@ class Reader {
     made.emissive = textureUvs(attributes, material.emissive, count);
     made.metal = textureUvs(attributes, material.metal, count);
     made.specular = textureUvs(attributes, material.specular_texture, count);
+    made.passing = textureUvs(attributes, material.passing, count);
     made.transmission_part = textureUvs(attributes, material.transmission_part, count);
     made.transmission_colour = textureUvs(attributes, material.transmission_colour, count);
     made.colours = readColours(attributes, count);
@@ -283,6 +284,7 @@ class Reader {
     triangle.alpha = values.alpha;
     triangle.cutoff = values.cutoff;
     triangle.transmission = values.transmission;
+    triangle.passing.texture = values.passing.texture;
     triangle.mirror = values.mirror;
     triangle.diffuse_transmission = values.diffuse_transmission;
     triangle.transmitted = values.transmitted;
@@ -302,6 +304,7 @@ class Reader {
       triangle.emissive.uv[k] = vertices.emissive.at(vertex);
       triangle.metal.uv[k] = vertices.metal.at(vertex);
       triangle.specular_texture.uv[k] = vertices.specular.at(vertex);
+      triangle.passing.uv[k] = vertices.passing.at(vertex);
       triangle.transmission_part.uv[k] = vertices.transmission_part.at(vertex);
       triangle.transmission_colour.uv[k] = vertices.transmission_colour.at(vertex);
       triangle.colours[k] = vertices.colours.at(vertex);
@@ -314,6 +317,7 @@ class Reader {
     triangle.coloured = colour[1] != colour[0] || colour[2] != colour[0];
     if (!triangle.coloured) {
       triangle.reflectance *= glm::dvec3(colour[0]);
+      triangle.mirror.colour *= glm::dvec3(colour[0]);
       if (triangle.see_through) triangle.alpha *= colour[0].w;
     }
     // What varies is bounded where it is read.

@@ -105,12 +105,14 @@ class MaterialReader {
     values.emissive = textureUse(material, "emissiveTexture");
   }
 
-  static void readOpacity(const json& material, const json& factor, MaterialValues& values) {
+  void readOpacity(const json& material, const json& factor, MaterialValues& values) {
     const auto mode = material.value("alphaMode", std::string("OPAQUE"));
     if (mode != "OPAQUE" && factor.is_array()) values.alpha = factor.at(3).get<double>();
     if (mode == "MASK") values.cutoff = material.value("alphaCutoff", 0.5);
-    if (const auto transmission = extensionOf(material, "KHR_materials_transmission"); transmission.is_object())
+    if (const auto transmission = extensionOf(material, "KHR_materials_transmission"); transmission.is_object()) {
       values.transmission = transmission.value("transmissionFactor", 0.0);
+      values.passing = textureUse(transmission, "transmissionTexture");
+    }
     values.see_through = mode != "OPAQUE";
     if (values.transmission <= 0.0) return;
     const auto ior = extensionOf(material, "KHR_materials_ior");

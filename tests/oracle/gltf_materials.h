@@ -31,7 +31,7 @@ struct MaterialValues {
   glm::dvec3 specular{0.0};
   double diffuse_transmission = 0.0;
   glm::dvec3 transmitted{0.0};
-  MaterialTexture base_colour, emissive, metal, specular_texture, transmission_part, transmission_colour;
+  MaterialTexture base_colour, emissive, metal, specular_texture, passing, transmission_part, transmission_colour;
 };
 
 /// Of the materials that a file names, in its order; what cannot be modelled is named in `warnings`.

@@ -82,9 +82,10 @@ std::optional<glm::dvec3> Mirrors::goOn(const Shading& shading, const Triangle& 
   const auto [u, v] = Shading::weights(triangle, place.position);
   const auto facing = shading.mirror(triangle, u, v);
   if (!facing.any() && triangle.transmission <= 0.0) return std::nullopt;
+  const double passing = shading.passing(triangle, u, v), cosine = -glm::dot(direction, place.normal);
   // The back of one side passes light; it reflects where that is all the front does.
-  const double lit = place.is_back && !hasTwoSides(triangle) && triangle.transmission < 0.999 ? 0.0 : 1.0;
-  const auto usual = facing.at(-glm::dot(direction, place.normal));
+  const double lit = place.is_back && !hasTwoSides(triangle) && passing < 0.999 ? 0.0 : 1.0;
+  const auto usual = facing.at(cosine);
   const double chance = std::clamp(std::max({usual.x, usual.y, usual.z}), 0.05, 0.95);
   if (random.uniform() < chance) {
     part *= lit / chance;
@@ -92,11 +93,12 @@ std::optional<glm::dvec3> Mirrors::goOn(const Shading& shading, const Triangle& 
   }
   part /= 1.0 - chance;
   if (triangle.transmission <= 0.0) return std::nullopt;
-  if (random.uniform() >= triangle.transmission * (1.0 - triangle.mirror.metallic)) {
-    part *= lit / (1.0 - triangle.transmission);  // which the reflectance has
+  const double enters = 1.0 - Shading::interfaceReflectance(triangle, cosine);
+  if (random.uniform() >= passing) {
+    part *= enters * lit / (1.0 - passing);  // the reflectance is of all that enters
     return std::nullopt;
   }
-  part *= shading.tint(triangle, u, v) * (1.0 - usual.x);  // glass reflects all channels alike
+  part *= shading.tint(triangle, u, v) * enters;
   return direction;
 }
 

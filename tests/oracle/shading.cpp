@@ -29,6 +29,11 @@ glm::dvec4 Shading::colour(const TextureUse& use, double u, double v) const {
   return texture == nullptr ? glm::dvec4(1.0) : texture->colour(between(use.uv, u, v));
 }
 
+glm::dvec4 Shading::value(const TextureUse& use, double u, double v) const {
+  const auto* texture = textureOf(use);
+  return texture == nullptr ? glm::dvec4(1.0) : texture->value(between(use.uv, u, v));
+}
+
 glm::dvec3 Shading::reflectance(const Triangle& triangle, double u, double v) const {
   const double part = transmittedPart(triangle, u, v);
   return part > 0.0 ? baseReflectance(triangle, u, v) * (1.0 - part) : baseReflectance(triangle, u, v);
@@ -59,12 +64,8 @@ Shading::Scattered Shading::scatter(const Triangle& triangle, double u, double v
 
 /// What glass, and metal and gloss where textures tell of them, leave.
 double Shading::diffusePart(const Triangle& triangle, double u, double v) const {
-  double part = 1.0 - triangle.transmission;
-  if (triangle.metallic > 0.0) {
-    const auto* texture = textureOf(triangle.metal);
-    const double blue = texture == nullptr ? 1.0 : texture->value(between(triangle.metal.uv, u, v)).z;
-    part *= 1.0 - triangle.metallic * blue;
-  }
+  double part = 1.0 - transmission(triangle, u, v);
+  if (triangle.metallic > 0.0) part *= 1.0 - triangle.metallic * value(triangle.metal, u, v).z;
   if (triangle.specular != glm::dvec3(0.0)) {
     const auto specular = triangle.specular * glm::dvec3(colour(triangle.specular_texture, u, v));
     part *= 1.0 - std::max({specular.x, specular.y, specular.z});
@@ -83,19 +84,36 @@ glm::dvec3 Shading::Facing::at(double cosine) const {
 }
 
 Shading::Facing Shading::mirror(const Triangle& triangle, double u, double v) const {
-  const auto& mirror = triangle.mirror;
-  double metal = mirror.metallic;
-  if (const auto* texture = textureOf(triangle.metal); texture != nullptr && metal > 0.0)
-    metal *= texture->value(between(triangle.metal.uv, u, v)).z;
-  Facing facing{metal * tint(triangle, u, v) / triangle.mirror.attenuation, metal};
-  if (mirror.interface > 0.0) facing = {glm::dvec3(mirror.interface), 1.0};
-  return facing;
+  const double of_metal = metal(triangle, u, v), interface = triangle.mirror.interface;
+  const double of_glass = interface > 0.0 ? 1.0 - of_metal : 0.0;
+  return {of_metal * baseColour(triangle, u, v) + of_glass * interface, of_metal + of_glass};
+}
+
+double Shading::interfaceReflectance(const Triangle& triangle, double cosine) {
+  const double interface = triangle.mirror.interface;
+  return interface > 0.0 ? Facing{glm::dvec3(interface), 1.0}.at(cosine).x : 0.0;
+}
+
+double Shading::metal(const Triangle& triangle, double u, double v) const {
+  const double factor = triangle.mirror.metallic;
+  return factor > 0.0 ? factor * value(triangle.metal, u, v).z : 0.0;
+}
+
+double Shading::transmission(const Triangle& triangle, double u, double v) const {
+  return triangle.transmission > 0.0 ? triangle.transmission * value(triangle.passing, u, v).x : 0.0;
+}
+
+double Shading::passing(const Triangle& triangle, double u, double v) const {
+  return transmission(triangle, u, v) * (1.0 - metal(triangle, u, v));
+}
+
+glm::dvec3 Shading::baseColour(const Triangle& triangle, double u, double v) const {
+  const auto result = triangle.mirror.colour * glm::dvec3(colour(triangle.base_colour, u, v));
+  return triangle.coloured ? result * glm::dvec3(between(triangle.colours, u, v)) : result;
 }
 
 glm::dvec3 Shading::tint(const Triangle& triangle, double u, double v) const {
-  auto colour_here = triangle.mirror.colour * glm::dvec3(colour(triangle.base_colour, u, v));
-  if (triangle.coloured) colour_here *= glm::dvec3(between(triangle.colours, u, v));
-  return colour_here * triangle.mirror.attenuation;
+  return baseColour(triangle, u, v) * triangle.mirror.attenuation;
 }
 
 glm::dvec3 Shading::emission(const Triangle& triangle, double u, double v) const {

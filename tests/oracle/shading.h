@@ -44,7 +44,12 @@ class Shading {
     /// Schlick 1994.
     [[nodiscard]] glm::dvec3 at(double cosine) const;
   };
+  /// Of a place that is partly metal: of both parts.
   [[nodiscard]] Facing mirror(const Triangle& triangle, double u, double v) const;
+  /// What the interface of glass alone reflects, of all channels alike; 0 of what is no glass.
+  [[nodiscard]] static double interfaceReflectance(const Triangle& triangle, double cosine);
+  /// Of light that enters a face, the part that is not scattered there, nor stopped by metal.
+  [[nodiscard]] double passing(const Triangle& triangle, double u, double v) const;
   /// Of light that goes on through a face of glass.
   [[nodiscard]] glm::dvec3 tint(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] double opacity(const Triangle& triangle, double u, double v) const;
@@ -57,6 +62,11 @@ class Shading {
     return use.texture < 0 ? nullptr : &textures_[static_cast<std::size_t>(use.texture)];
   }
   [[nodiscard]] glm::dvec4 colour(const TextureUse& use, double u, double v) const;
+  /// As stored: of textures that hold no colours. One without a texture.
+  [[nodiscard]] glm::dvec4 value(const TextureUse& use, double u, double v) const;
+  [[nodiscard]] glm::dvec3 baseColour(const Triangle& triangle, double u, double v) const;
+  [[nodiscard]] double transmission(const Triangle& triangle, double u, double v) const;
+  [[nodiscard]] double metal(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] double diffusePart(const Triangle& triangle, double u, double v) const;
   [[nodiscard]] double transmittedPart(const Triangle& triangle, double u, double v) const;
 

@@ -94,9 +94,11 @@ bool sameMaterial(const Triangle& a, const Triangle& b) {
          a.emissive.texture == b.emissive.texture && a.metal.texture == b.metal.texture &&
          a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
          a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission &&
-         a.mirror.metallic == b.mirror.metallic && a.mirror.interface == b.mirror.interface &&
-         a.mirror.roughness == b.mirror.roughness && a.diffuse_transmission == b.diffuse_transmission &&
-         a.transmitted == b.transmitted && a.transmission_part.texture == b.transmission_part.texture &&
+         a.passing.texture == b.passing.texture && a.mirror.colour == b.mirror.colour &&
+         a.mirror.attenuation == b.mirror.attenuation && a.mirror.metallic == b.mirror.metallic &&
+         a.mirror.interface == b.mirror.interface && a.mirror.roughness == b.mirror.roughness &&
+         a.diffuse_transmission == b.diffuse_transmission && a.transmitted == b.transmitted &&
+         a.transmission_part.texture == b.transmission_part.texture &&
          a.transmission_colour.texture == b.transmission_colour.texture;
 }
 

@@ -40,7 +40,7 @@ struct TextureUse {
 /// What a surface reflects as a mirror does, or lets through as a thin sheet of glass does.
 struct Mirror {
   double metallic = 0.0;        ///< as the file has it; `Triangle::metal` multiplies it by place
-  glm::dvec3 colour{0.0};       ///< of metal, and of what glass lets through; the base colour's texture multiplies it
+  glm::dvec3 colour{0.0};       ///< of metal, and of what glass lets through; texture and varying colours multiply it
   double interface = 0.0;       ///< of glass: reflectance of one interface, of light straight at it; 0: it is none
   double roughness = 1.0;       ///< its square is the width of the slopes
   glm::dvec3 attenuation{1.0};  ///< of light through a face of glass
@@ -67,6 +67,7 @@ struct Triangle {
   double alpha = 1.0;
   double cutoff = -1.0;  ///< alpha mask; below 0: blended
   double transmission = 0.0;
+  TextureUse passing;  ///< its red multiplies `transmission`
   Mirror mirror;
   /// KHR_materials_diffuse_transmission: of the light that is not reflected specularly, and its colour. Above 0 light
   /// arrives at, and leaves from, both sides, whatever `double_sided` says.

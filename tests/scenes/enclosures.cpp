@@ -53,6 +53,30 @@ TestScene perpendicularPlates(double edge, double depth, double height, double e
   return scene;
 }
 
+TestScene tintedBox(double reflectance, glm::dvec3 emission_nits, glm::dvec3 tint) {
+  TestScene scene;
+  scene.name = "tinted_box";
+  const auto light = scene.add({"light", glm::dvec3(reflectance), emission_nits});
+  const auto grey = scene.add({"grey", glm::dvec3(reflectance), glm::dvec3(0.0)});
+  Material wall{"mirror", glm::dvec3(1.0), glm::dvec3(0.0)}, glass{"glass", tint, glm::dvec3(0.0)};
+  wall.metallic = 1.0;
+  glass.transmission = 1.0;
+  glass.double_sided = true;
+  wall.roughness = glass.roughness = 0.0;
+  const auto mirror = scene.add(wall);
+  constexpr double kWidth = 4.0, kHeight = 1.0, kMiddle = kHeight / 2;
+  Object floor{"floor", {}, {}}, ceiling{"ceiling", {}, {}}, walls{"walls", {}, {}}, pane{"pane", {}, {}};
+  const glm::dvec3 low(0.0), high(kWidth, kHeight, kWidth);
+  appendBox(floor, low, high, allFaces(light), ~unsigned{kYMin}, true);
+  appendBox(ceiling, low, high, allFaces(grey), ~unsigned{kYMax}, true);
+  appendBox(walls, low, high, allFaces(mirror), kYMin | kYMax, true);
+  pane.polygons.push_back(
+      {{{0, kMiddle, 0}, {0, kMiddle, kWidth}, {kWidth, kMiddle, kWidth}, {kWidth, kMiddle, 0}}, scene.add(glass)});
+  scene.objects = {std::move(floor), std::move(ceiling), std::move(walls), std::move(pane)};
+  scene.camera = {{3.6, 0.9, 3.6}, {1.0, 0.2, 1.0}, 1.2, 1.0};
+  return scene;
+}
+
 TestScene concentricSpheres(const SphereSpec& inner, const SphereSpec& outer, unsigned subdivisions) {
   TestScene scene;
   scene.name = "sphere_in_sphere";

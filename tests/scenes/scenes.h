@@ -31,6 +31,12 @@ namespace radiosity::test_scenes {
 [[nodiscard]] TestScene perpendicularPlates(double edge, double depth, double height, double emission_nits,
                                             double reflectance);
 
+/// A box 4 m by 4 m and 1 m high whose floor shines, with a face of glass of this tint across the middle of its height.
+/// Its walls are perfect mirrors, so that floor, glass and ceiling are as if they had no end: of light from all around
+/// the face reflects R = 0.04 + 0.96 / 21 and passes T = (1 - R) x tint, and with B = E + reflectance x H on the floor,
+/// B' = reflectance x H' on the ceiling, H = R B + T B' and H' = R B' + T B.
+[[nodiscard]] TestScene tintedBox(double reflectance, glm::dvec3 emission_nits, glm::dvec3 tint);
+
 struct SphereSpec {
   double radius_m = 1.0;
   double reflectance = 0.5;

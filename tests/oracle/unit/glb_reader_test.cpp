@@ -51,6 +51,15 @@ TriangleScene readTriangle(const json& material, const std::string& left, const 
                                    0,
                                    1,
                                    1,
+                                   1,
+                                   /* one colour */ 0.5,
+                                   0.25,
+                                   1,
+                                   0.5,
+                                   0.25,
+                                   1,
+                                   0.5,
+                                   0.25,
                                    1};
   folder.write("data.bin", std::string(reinterpret_cast<const char*>(numbers.data()), 4 * numbers.size()));
   folder.write("a b.ppm", "P6\n2 1\n255\n" + left + right);
@@ -67,9 +76,9 @@ TriangleScene readTriangle(const json& material, const std::string& left, const 
             {"textures", {{{"source", 0}, {"sampler", 0}}}},
             {"materials", {material}},
             {"meshes", json::array({mesh})},
-            {"buffers", {{{"byteLength", 132}, {"uri", "data.bin"}}}},
-            {"bufferViews", {{{"buffer", 0}, {"byteLength", 132}}}}};
-  for (const auto& [offset, type] : {std::pair{0, "VEC3"}, {36, "VEC2"}, {60, "VEC3"}, {96, "VEC3"}})
+            {"buffers", {{{"byteLength", 168}, {"uri", "data.bin"}}}},
+            {"bufferViews", {{{"buffer", 0}, {"byteLength", 168}}}}};
+  for (const auto& [offset, type] : {std::pair{0, "VEC3"}, {36, "VEC2"}, {60, "VEC3"}, {96, "VEC3"}, {132, "VEC3"}})
     gltf["accessors"].push_back(
         {{"bufferView", 0}, {"byteOffset", offset}, {"componentType", 5126}, {"count", 3}, {"type", type}});
   folder.write("a.gltf", gltf.dump());
@@ -125,6 +134,43 @@ TEST(GlbReader, ColoursOfVerticesVaryOverTheTriangle) {
   const auto scene = readTriangle({{"pbrMetallicRoughness", {{"metallicFactor", 0}}}}, "abc", "abc", {{"COLOR_0", 3}});
   const Shading shading(scene);
   EXPECT_NEAR(shading.reflectance(shading.triangles().at(0), 0.5, 0.25).x, 0.5, 1e-9);
+}
+
+/// Of glass: factor, colours and extensions that its tint is made of.
+json glass(const json& transmission) {
+  return {{"pbrMetallicRoughness", {{"baseColorFactor", {0.8, 0.4, 0.5, 1}}, {"metallicFactor", 0}}},
+          {"extensions",
+           {{"KHR_materials_transmission", transmission},
+            {"KHR_materials_volume",
+             {{"attenuationColor", {0.25, 1, 0}}, {"attenuationDistance", 2}, {"thicknessFactor", 4}}}}}};
+}
+
+TEST(GlbReader, GlassPassesWhatTheRedOfItsTextureSays) {
+  const auto scene = readTriangle(glass({{"transmissionFactor", 0.5}, {"transmissionTexture", kTexture}}),
+                                  std::string("\x33\xFF\xFF", 3), std::string("\xCC\0\0", 3));
+  const Shading shading(scene);
+  const auto& triangle = shading.triangles().at(0);
+  EXPECT_NEAR(shading.passing(triangle, 0.25, 0.1), 0.5 * 0.2, 1e-9);
+  EXPECT_NEAR(shading.passing(triangle, 0.75, 0.1), 0.5 * 0.8, 1e-9);
+  EXPECT_NEAR(shading.reflectance(triangle, 0.75, 0.1).x, 0.8 * 0.6, 1e-9);
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+// Each of two faces has the root of what the whole thickness, twice the distance, leaves.
+TEST(GlbReader, GlassIsTintedByFactorTimesColoursTimesHalfItsVolume) {
+  const json clear{{"transmissionFactor", 1}};
+  const auto uniform = readTriangle(glass(clear), "abc", "abc", {{"COLOR_0", 4}});
+  const auto tint = Shading(uniform).tint(uniform.triangles.at(0), 0.5, 0.25);
+  EXPECT_NEAR(tint.x, 0.8 * 0.5 * 0.25, 1e-9);
+  EXPECT_NEAR(tint.y, 0.4 * 0.25, 1e-9);
+  EXPECT_EQ(tint.z, 0.0);
+  const auto varying = readTriangle(glass(clear), "abc", "abc", {{"COLOR_0", 3}});
+  EXPECT_NEAR(Shading(varying).tint(varying.triangles.at(0), 0.5, 0.25).y, 0.4 * 0.5, 1e-9);
+  auto textured = glass(clear);
+  textured["pbrMetallicRoughness"]["baseColorTexture"] = kTexture;
+  const auto by_place = readTriangle(textured, std::string("\0\0\0", 3), std::string("\xFF\x80\xFF", 3));
+  EXPECT_EQ(Shading(by_place).tint(by_place.triangles.at(0), 0.25, 0.1), glm::dvec3(0.0));
+  EXPECT_NEAR(Shading(by_place).tint(by_place.triangles.at(0), 0.75, 0.1).y, 0.4 * 0.21586, 1e-3);
 }
 
 // Two targets, each of which moves the corners by their own positions.
