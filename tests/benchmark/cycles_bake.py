@@ -108,7 +108,8 @@ class Material:
         material = gltf["materials"][index] if index is not None else {"pbrMetallicRoughness": {"metallicFactor": 0}}
         extensions = material.get("extensions", {})
         pbr = material.get("pbrMetallicRoughness", {})
-        if "baseColorTexture" in pbr or "emissiveTexture" in material or "metallicRoughnessTexture" in pbr:
+        glass = extensions.get("KHR_materials_transmission", {})
+        if "baseColorTexture" in pbr or "emissiveTexture" in material or "metallicRoughnessTexture" in pbr or "transmissionTexture" in glass:
             raise ValueError("textures are not baked")
         if material.get("alphaMode", "OPAQUE") != "OPAQUE":
             raise ValueError("surfaces with holes are not baked")
@@ -117,9 +118,9 @@ class Material:
         if 0 < metallic < 1:
             raise ValueError("half metals are not baked")
         self.is_metal = metallic == 1
-        self.is_glass = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0
-        if self.is_glass and (extensions["KHR_materials_transmission"]["transmissionFactor"] < 1 or max(base) - min(base) > 1e-3):
-            raise ValueError("only glass without colour is baked that passes all that it does not reflect")
+        self.is_glass = glass.get("transmissionFactor", 0) > 0 and not self.is_metal  # which passes nothing
+        if self.is_glass and glass["transmissionFactor"] < 1:
+            raise ValueError("only glass is baked that scatters nothing")
         if self.is_glass and ("KHR_materials_volume" in extensions or extensions.get("KHR_materials_ior", {}).get("ior", 1.5) != 1.5):
             raise ValueError("only thin glass with an index of 1.5 is baked")
         self.base, self.roughness = base, pbr.get("roughnessFactor", 1.0)
@@ -186,7 +187,7 @@ class Shader:
 
 
 def surface_of(shader, look):
-    """Metal is GGX by Schlick's law; a face of glass one interface, also by Schlick's, behind which light goes straight on."""
+    """Metal is GGX by Schlick's law; a face of glass one interface, also by Schlick's, behind which light goes straight on, tinted."""
     if look.is_metal:
         metal = shader.bsdf("ShaderNodeBsdfPrincipled", look.base, Metallic=1.0, Roughness=look.roughness)
         metal.node.distribution = "MULTI_GGX"

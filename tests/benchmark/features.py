@@ -18,6 +18,7 @@ CASES = {
     "plain": ("room_small", [], None),
     "mirror": ("room_small_mirror", [], "plain"),
     "glass": ("room_small_glass", [], "plain"),
+    "coloured glass": ("room_small_tinted", [], "plain"),
     "brushed metal": ("room_small_brushed", [], "plain"),
     "paper shade": ("room_small_shade", [], "plain"),
     "point and spot": ("room_lights", [], "plain"),

@@ -202,6 +202,29 @@ TestScene glassRoom() {
   return scene;
 }
 
+/// The small room with tops of tables, and seats, of coloured glass, and a pane of it under one half of the lamp: all
+/// of the light that comes through it is coloured, and beside it none is.
+TestScene tintedRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_small_tinted";
+  const auto makeGlass = [](Material& material, const glm::dvec3& tint) {
+    material.transmission = 1.0;
+    material.reflectance = tint;
+    material.roughness = 0.0;
+  };
+  for (auto& material : scene.materials) {
+    if (material.name == "wood") makeGlass(material, {0.3, 0.6, 0.95});
+    if (material.name == "red_seat") makeGlass(material, {0.9, 0.15, 0.1});
+    if (material.name == "green_seat") makeGlass(material, {0.15, 0.85, 0.3});
+  }
+  Material amber{"amber", {}, {}};
+  makeGlass(amber, {0.95, 0.5, 0.1});
+  Object pane{"pane", {0.0, 2.1, 0.0}, {}};
+  appendBox(pane, {-1.6, 2.1, -0.9}, {0.0, 2.12, 0.9}, allFaces(scene.add(amber)));
+  scene.objects.push_back(std::move(pane));
+  return scene;
+}
+
 /// The small room with walls of brushed metal.
 TestScene brushedRoom() {
   auto scene = smallRoom();
@@ -265,6 +288,7 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
           {"room_small", smallRoom},
           {"room_small_mirror", mirrorRoom},
           {"room_small_glass", glassRoom},
+          {"room_small_tinted", tintedRoom},
           {"room_small_brushed", brushedRoom},
           {"room_small_shade", shadeRoom},
           {"room_small_open", openRoom},

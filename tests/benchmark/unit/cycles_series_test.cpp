@@ -14,7 +14,7 @@
 namespace radiosity::benchmark {
 namespace {
 
-/// A mirror, brushed metal, glass and paper are in these rooms.
+/// A mirror, brushed metal, glass, clear and coloured, and paper are in these rooms.
 class CyclesBakes : public testing::TestWithParam<const char*> {};
 
 TEST_P(CyclesBakes, ConvergeToThePathTracer) {
@@ -48,7 +48,7 @@ TEST_P(CyclesBakes, ConvergeToThePathTracer) {
 
 INSTANTIATE_TEST_SUITE_P(Scene, CyclesBakes,
                          testing::Values("cornell", "room_small_mirror", "room_small_brushed", "room_small_glass",
-                                         "room_small_shade"),
+                                         "room_small_tinted", "room_small_shade"),
                          [](const auto& info) { return std::string(info.param); });
 
 TEST(CyclesSeries, WithoutTexelsThatABakeCanBeJudgedOnNothingIsBaked) {
