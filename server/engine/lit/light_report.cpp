@@ -233,8 +233,11 @@ std::string lightName(const LitParts& parts, std::size_t number) {
 /// What lamps that are no surfaces send at mirrors.
 void tellMirrors(const LitParts& parts, const solver::Solver& solver, double emitted,
                  std::vector<std::string>& warnings) {
-  if (!solver.showsMirrors() && parts.materials.specular.sideCount() > 0) {
-    warnings.emplace_back("metal and glass reflect nothing by this method; the default one shows what they do");
+  if (!solver.showsMirrors()) {
+    if (parts.materials.specular.sideCount() > 0)
+      warnings.emplace_back("metal and glass reflect nothing by this method; the default one shows what they do");
+    if (!parts.patches.tints.empty())
+      warnings.emplace_back("coloured glass passes all channels by this method as it does the one that passes best");
     return;
   }
   const double spread = solver.spreadByMirrors();

@@ -28,10 +28,22 @@ bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse us
   return use_a == use_b;
 }
 
+/// All that decides how much passes, and of which colour. Factors by themselves, since those of metal are 1 as often as
+/// not, whatever the textures say.
+bool samePassage(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  if (m.transmission <= 0.0F && n.transmission <= 0.0F) return true;
+  return m.transmission == n.transmission && m.base_color == n.base_color && m.attenuation == n.attenuation &&
+         m.metallic == n.metallic && m.specular == n.specular &&
+         sameTexture(a, m.transmission_texture, b, n.transmission_texture) &&
+         sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+         sameTexture(a, m.metallic_texture, b, n.metallic_texture) &&
+         sameTexture(a, m.specular_texture, b, n.specular_texture);
+}
+
 /// Which sides a surface has, and where one can see through it.
 bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material& n) {
   if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode || m.isTranslucent() != n.isTranslucent() ||
-      scene::passedPart(m) != scene::passedPart(n) || scene::isSeeThrough(m) != scene::isSeeThrough(n) ||
+      !samePassage(a, m, b, n) || scene::isSeeThrough(m) != scene::isSeeThrough(n) ||
       scene::glassFace(m) != scene::glassFace(n))
     return false;
   if (m.alpha_mode == AlphaMode::kOpaque) return true;

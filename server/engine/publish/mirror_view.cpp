@@ -56,18 +56,19 @@ class MirrorView {
     const auto direction = glm::normalize(glm::dmat3(camera_) * glm::dvec3(at, -1.0));
     solver::LeafRays::Place from, end;
     from.position = eye_;
-    auto value = rays_->see(from, direction, key, end);
+    solver::LeafRays::Panes panes;
+    auto value = rays_->see(from, direction, key, end, nullptr, &panes);
     for (int back = 0; back < kMostBacks && value == solver::LeafRays::kNothing; ++back) {
       from.position = end.position;
       from.triangle = end.triangle;
-      value = rays_->see(from, direction, key, end);
+      value = rays_->see(from, direction, key, end, nullptr, &panes);
     }
     if (value >= own_.size() || !mirrors_->has(value)) return glm::vec3(0.0F);
     const double roughness = mirrors_->roughness(value);
     const std::uint32_t count = roughness > 0.0 ? kDirections : 1;
     glm::vec3 sum(0.0F);
     for (std::uint32_t i = 0; i < count; ++i) sum += reflected(end, value, direction, solver::mixKeys(key, i));
-    return sum / static_cast<float>(count);
+    return glm::vec3(panes.tint) * (sum / static_cast<float>(count));
   }
 
  private:
@@ -85,7 +86,9 @@ class MirrorView {
     glm::vec3 part(1.0F);
     for (const double edge : reflection.edges()) part *= mirrors_->reflectance(value, static_cast<float>(edge));
     solver::LeafRays::Place end;
-    const auto seen = rays_->see(at, reflection.direction, key, end);
+    solver::LeafRays::Panes panes;
+    const auto seen = rays_->see(at, reflection.direction, key, end, nullptr, &panes);
+    part *= glm::vec3(panes.tint);
     if (solver::LeafRays::isSky(seen)) return part * gpu::skyRadiance(scene_.sky, reflection.direction);
     if (seen == solver::LeafRays::kNothing) return glm::vec3(0.0F);
     return part * radiosityAt(end, seen) * static_cast<float>(std::numbers::inv_pi);

@@ -38,10 +38,11 @@ std::size_t indexOf(const Json& value, std::size_t count) {
   return std::min(value.get<std::size_t>(), count);
 }
 
-/// How an image is used: as colours, as numbers; what is used both ways is held twice.
-constexpr std::uint8_t kAsColours = 1, kAsNumbers = 2;
+/// How an image is used: as colours, as numbers, as a mask; what is used in two ways is held twice.
+constexpr std::uint8_t kAsColours = 1, kAsNumbers = 2, kAsMask = 4;
 std::uint8_t useOf(std::string_view key) {
-  return key == "metallicRoughnessTexture" || key == "transmissionTexture" ? kAsNumbers : kAsColours;
+  if (key == "transmissionTexture") return kAsMask;
+  return key == "metallicRoughnessTexture" ? kAsNumbers : kAsColours;
 }
 
 /// Marks what a material uses. Values nest at most 64 deep.

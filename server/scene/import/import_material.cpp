@@ -199,14 +199,20 @@ class MaterialImporter {
     if (const auto* ior = extensionOf(json, "KHR_materials_ior")) out.ior = clampedIor(ior->value("ior", 1.5));
     if (const auto* transmission = extensionOf(json, "KHR_materials_transmission")) {
       out.transmission = unit(transmission->value("transmissionFactor", 0.0));
-      const auto texture = out.transmission > 0.0F ? meanRed(json, kTransmissionTexture) : 1.0F;
-      if (!texture) return tl::unexpected(texture.error());
-      out.transmission *= *texture;
+      if (auto ok = readTransmission(json, out); !ok) return ok;
     }
     if (const auto* volume = extensionOf(json, "KHR_materials_volume")) out.attenuation = attenuationOf(*volume);
     if (extensionOf(json, "KHR_materials_unlit") != nullptr) {
       context_.warn(pointer_, "KHR_materials_unlit: lit like any other surface");
     }
+    return {};
+  }
+
+  Result<void> readTransmission(const Json& json, Material& out) {
+    red_ = 1.0F;
+    if (out.transmission <= 0.0F) return {};
+    if (auto ok = readTexture(json, kTransmissionTexture, Coding::kRed, out.transmission_texture); !ok) return ok;
+    out.transmission *= red_;
     return {};
   }
 
@@ -219,7 +225,7 @@ class MaterialImporter {
                                             std::to_string(count) + " entries; " + what);
   }
 
-  enum class Coding { kSrgb, kLinear };
+  enum class Coding { kSrgb, kLinear, kRed };
 
   /// What a texture info refers to: the texture, and its image. Both are there, or neither.
   struct Picture {
@@ -233,25 +239,6 @@ class MaterialImporter {
     const auto& texture = context_.document.gltf["textures"][*index];
     const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
     return image ? Picture{&texture, *image} : Picture{};
-  }
-
-  /// Of the whole picture; 1 without one. How much passes is known for a surface as a whole.
-  Result<float> meanRed(const Json& material, const char* member) {
-    const Json::json_pointer pointer(member);
-    if (!material.contains(pointer)) return 1.0F;
-    const auto picture = pictureOf(material.at(pointer));
-    if (!picture) return tl::unexpected(picture.error());
-    if (picture->texture == nullptr) return 1.0F;
-    const auto* before = known(picture->image);
-    auto red = before != nullptr ? before->red : std::nullopt;
-    if (!red) {
-      const auto pixels = decode(picture->image, false);
-      if (!pixels) return tl::unexpected(pixels.error());
-      red = {meanOf(*pixels, 0), !sameChannel(*pixels, 0)};
-    }
-    if (red->varies) context_.warn(pointer_ + member, "varies; its mean is used all over");
-    keep(picture->image).red = red;
-    return red->mean;
   }
 
   /// `member`: a JSON pointer into the material. Without such a texture, or with one that cannot be had, `use` stays as
@@ -273,9 +260,11 @@ class MaterialImporter {
     }
     // Where a file names no filter the choice is ours. Charts of an atlas lie side by side, and metal is a matter of
     // yes or no: a texel of it does not shade off into the next.
-    read.nearest = coding == Coding::kLinear;
+    read.nearest = coding != Coding::kSrgb;
     if (auto ok = readSampler(*picture->texture, read); !ok) return ok;
-    const auto loaded = coding == Coding::kSrgb ? colorTexture(picture->image) : dataTexture(picture->image);
+    const auto loaded = coding == Coding::kSrgb     ? colorTexture(picture->image)
+                        : coding == Coding::kLinear ? dataTexture(picture->image)
+                                                    : maskTexture(picture->image);
     if (!loaded) return tl::unexpected(loaded.error());
     read.texture = *loaded;
     use = read;
@@ -428,6 +417,29 @@ class MaterialImporter {
     return found;
   }
 
+  /// kNone where it tells nothing that `red_` does not.
+  Result<std::uint32_t> maskTexture(std::size_t image) {
+    DecodedImage mask;
+    if (const auto* before = known(image); before != nullptr) mask = *before;
+    if (!mask.mask && !mask.red) {
+      auto texture = decode(image, false);
+      if (!texture) return tl::unexpected(texture.error());
+      mask.red = sameChannel(*texture, 0);
+      if (!mask.red) mask.mask = std::make_shared<const Texture>(std::move(*texture));
+    }
+    auto& kept = keep(image);
+    kept.mask = mask.mask;
+    kept.red = mask.red;
+    red_ = mask.red.value_or(1.0F);
+    if (mask.red) return kNone;
+    const auto known_as = mask_textures_.find(image);
+    if (known_as != mask_textures_.end()) return known_as->second;
+    const auto index = static_cast<std::uint32_t>(context_.scene.textures.size());
+    context_.scene.textures.push_back(std::move(mask.mask));
+    mask_textures_[image] = index;
+    return index;
+  }
+
   /// The value that all pixels have of a channel; none: they differ.
   static std::optional<float> sameChannel(const Texture& texture, std::size_t channel) {
     for (std::size_t i = channel; i < texture.rgba.size(); i += 4) {
@@ -448,6 +460,7 @@ class MaterialImporter {
   std::string pointer_;
   std::map<std::size_t, std::uint32_t> color_textures_;  ///< by image
   std::map<std::size_t, DataTexture> data_textures_;     ///< by image
+  std::map<std::size_t, std::uint32_t> mask_textures_;   ///< by image
   struct Ahead {
     std::size_t image;
     bool srgb;
@@ -455,6 +468,7 @@ class MaterialImporter {
   };
   std::optional<Ahead> ahead_;       ///< what nobody has asked for yet
   std::optional<DataTexture> data_;  ///< the last that was asked for
+  float red_ = 1.0F;                 ///< of the last mask, where it is the same all over
   std::set<std::string> warned_;     ///< textures whose references were looked at
 };
 

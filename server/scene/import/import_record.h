@@ -19,16 +19,12 @@
 namespace radiosity::scene {
 
 struct DecodedImage {
-  /// Of one channel, linear, 0 to 1.
-  struct ChannelMean {
-    float mean = 1.0F;
-    bool varies = false;  ///< over the picture
-  };
   SharedList<Texture>::Element color;  ///< sRGB; null: not asked for
   SharedList<Texture>::Element data;   ///< linear; null: not asked for, or of no use (see there)
   std::optional<float> blue;           ///< 0 to 1: that which is the same all over
   float mean_green = 1.0F;             ///< 0 to 1, of `data`, or of what it would be
-  std::optional<ChannelMean> red;      ///< none: not asked for
+  SharedList<Texture>::Element mask;   ///< linear, of which red counts; null: not asked for, or the same all over
+  std::optional<float> red;            ///< 0 to 1: that which is the same all over
   std::uint8_t halvings = 0;           ///< of width and height (ImagePlan)
 };
 /// By the bytes that they are decoded from, which so stay those of that image.

@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/give_back.h"
@@ -21,12 +22,22 @@ namespace {
 
 constexpr std::uint64_t kMaxCells = std::uint64_t{1} << 26;
 constexpr std::uint32_t kMaxScale = 64;        ///< cells across a leaf
+constexpr std::uint32_t kMaxPaneScale = 16;    ///< the same of what is glass all over
 constexpr int kSamples = 3;                    ///< kSamples^2 looks at the texture in each cell
 constexpr std::uint32_t kCellsAtOnce = 16384;  ///< of one thread, about
+
+constexpr glm::u16vec3 kWhite(PatchScene::kTintSteps);
 
 /// In steps of 1/255; what is no number is 0.
 std::uint8_t byteOf(float opacity) {
   return static_cast<std::uint8_t>(std::lround(255.0F * (opacity > 0.0F ? std::min(opacity, 1.0F) : 0.0F)));
+}
+
+/// By channel, of what passes of the one that does so best.
+glm::u16vec3 tintOf(const glm::vec3& passes) {
+  const float most = mostOf(passes);
+  if (!(most > 0.0F)) return kWhite;
+  return glm::u16vec3(glm::round(static_cast<float>(PatchScene::kTintSteps) * (passes / most)));
 }
 
 /// Texture coordinates over a triangle, which are affine in the chart's.
@@ -46,7 +57,42 @@ struct UvMap {
   [[nodiscard]] glm::vec2 at(const glm::dvec2& p) const { return glm::vec2(origin + p.x * across + p.y * up); }
 };
 
-/// Opacity over one surface.
+/// A texture of a material, as a triangle has it.
+class LaidTexture {
+ public:
+  /// `use` and the scene are to outlive it. Nothing where there is no texture.
+  static std::optional<LaidTexture> of(const Scene& scene, const Primitive& primitive, const TextureUse& use) {
+    if (use.texture >= scene.textures.size()) return std::nullopt;
+    return LaidTexture(scene.textures[use.texture], primitive, use);
+  }
+
+  /// Pixels of it across a step in the triangle's chart.
+  [[nodiscard]] double pixelsAcross(const ChartCorners& c) const {
+    const UvMap uv(c, texcoords());
+    double most = 1.0;
+    for (const auto& step : {uv.across, uv.up}) {
+      const double across = glm::length(step * size_ * glm::dvec2(use_->scale));
+      if (std::isfinite(across)) most = std::max(most, across);
+    }
+    return most;
+  }
+  [[nodiscard]] UvMap over(const ChartCorners& c) const { return {c, texcoords()}; }
+  [[nodiscard]] const PlainTexture& pixels() const { return pixels_; }
+
+ private:
+  LaidTexture(const Texture& texture, const Primitive& primitive, const TextureUse& use)
+      : pixels_(texture, use), use_(&use), primitive_(&primitive), size_(texture.width, texture.height) {}
+  [[nodiscard]] const std::vector<glm::vec2>& texcoords() const {
+    return use_->texcoord == 1 ? primitive_->texcoord1 : primitive_->texcoord0;
+  }
+
+  PlainTexture pixels_;
+  const TextureUse* use_;
+  const Primitive* primitive_;
+  glm::dvec2 size_;
+};
+
+/// What passes over one surface: how much, and of which colour.
 class SurfaceOpacity {
  public:
   SurfaceOpacity(const Scene& scene, PatchScene& patches, Surface& surface)
@@ -55,27 +101,35 @@ class SurfaceOpacity {
         material_(materialOf(scene, surface)),
         instance_(scene.instances[surface.instance]),
         primitive_(patches.cuts.primitiveOf(scene, surface.instance)) {
-    const auto texture = material_.base_color_texture.texture;
-    if (texture < scene.textures.size() && material_.alpha_mode != AlphaMode::kOpaque) {
-      texture_.emplace(scene.textures[texture], material_.base_color_texture);
-      texture_size_ = glm::dvec2(scene.textures[texture].width, scene.textures[texture].height);
-    }
+    const bool passes = material_.transmission > 0.0F;
+    const auto lay = [&](const TextureUse& use, bool is_used) {
+      return is_used ? LaidTexture::of(scene, primitive_, use) : std::nullopt;
+    };
+    base_ = lay(material_.base_color_texture, passes || material_.alpha_mode != AlphaMode::kOpaque);
+    part_ = lay(material_.transmission_texture, passes);
+    metal_ = lay(material_.metallic_texture, passes && material_.metallic > 0.0F);
+    shine_ = lay(material_.specular_texture, passes && material_.specular != glm::vec3(0.0F));
   }
 
-  /// Cells across a leaf that follow the alpha texture's pixels: a power of two.
+  /// Whether a place may pass one channel better than another.
+  [[nodiscard]] bool mayTint() const {
+    if (material_.transmission <= 0.0F) return false;
+    const auto whole = passedPart(material_, PassingPlace::of(material_));
+    return base_ || !primitive_.color0.empty() || tintOf(whole) != kWhite;
+  }
+
+  /// Cells across a leaf that follow the pixels of its textures: a power of two.
   [[nodiscard]] std::uint32_t wantedScale() const {
-    if (!texture_) return 1;
     double pixels = 1.0;  // of the texture, across a leaf
-    for (std::uint32_t i = 0; i < std::min(surface_.triangle_count, 64U); ++i) {
-      const UvMap uv(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_), texcoords());
-      const auto size = texture_size_ * glm::dvec2(material_.base_color_texture.scale);
-      for (const auto& step : {uv.across, uv.up}) {
-        const double across = glm::length(step * size);
-        if (std::isfinite(across)) pixels = std::max(pixels, across);
-      }
+    for (const auto* texture : {&base_, &part_, &metal_, &shine_}) {
+      for (std::uint32_t i = 0; *texture && i < std::min(surface_.triangle_count, 64U); ++i)
+        pixels = std::max(
+            pixels, (*texture)->pixelsAcross(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_)));
     }
     std::uint32_t scale = 1;
-    while (scale < kMaxScale && scale < pixels) scale *= 2;
+    // What is cut out has edges that show in every shadow; the pattern of a pane need not be so fine.
+    const auto most = material_.alpha_mode == AlphaMode::kOpaque ? kMaxPaneScale : kMaxScale;
+    while (scale < most && scale < pixels) scale *= 2;
     return scale;
   }
 
@@ -84,8 +138,10 @@ class SurfaceOpacity {
     return std::uint64_t{surface_.width} * surface_.height * surface_.opacity_scale * surface_.opacity_scale;
   }
 
-  /// Once the surface has its place among all cells. Returns how many rows there are.
+  /// Once the surface has its place among all cells, and among those with tints if it may tint. Returns how many rows
+  /// there are.
   std::uint32_t start() {
+    has_tints_ = mayTint();
     width_ = surface_.width * surface_.opacity_scale;
     height_ = surface_.height * surface_.opacity_scale;
     known_.assign(std::size_t{width_} * height_, 0);
@@ -111,7 +167,7 @@ class SurfaceOpacity {
     for (std::uint32_t y = 0; y < height_; ++y) {
       interruptionPoint();
       for (std::uint32_t x = 0; x < width_; ++x) {
-        if (known_[std::size_t{y} * width_ + x] == 0) cell(x, y) = neighbour(x, y);
+        if (known_[std::size_t{y} * width_ + x] == 0) fillLikeNeighbour(x, y);
       }
     }
     giveBack(known_);
@@ -119,10 +175,6 @@ class SurfaceOpacity {
   }
 
  private:
-  [[nodiscard]] const std::vector<glm::vec2>& texcoords() const {
-    return material_.base_color_texture.texcoord == 1 ? primitive_.texcoord1 : primitive_.texcoord0;
-  }
-
   struct Extent {
     glm::dvec2 low, high;
   };
@@ -136,37 +188,69 @@ class SurfaceOpacity {
     return static_cast<std::uint32_t>(std::clamp(y, 0.0, static_cast<double>(height_)));
   }
 
-  [[nodiscard]] float alphaAt(const ChartCorners& c, const UvMap& uv, const glm::dvec2& p) const {
-    float alpha = material_.alpha;
-    if (texture_) alpha *= texture_->at(uv.at(p));
-    if (!primitive_.color0.empty()) {
-      glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
-      w /= w.x + w.y + w.z;  // beyond an edge the rest would be more than all
-      const auto& color = primitive_.color0;
-      alpha *= color[c.vertex[0]].a * w[0] + color[c.vertex[1]].a * w[1] + color[c.vertex[2]].a * w[2];
-    }
-    return alpha;
+  /// Of a triangle.
+  struct Laid {
+    const ChartCorners& corners;
+    std::optional<UvMap> base, part, metal, shine;
+  };
+  [[nodiscard]] Laid over(const ChartCorners& c) const {
+    const auto lay = [&](const std::optional<LaidTexture>& texture) {
+      return texture ? std::optional<UvMap>(texture->over(c)) : std::nullopt;
+    };
+    return {c, lay(base_), lay(part_), lay(metal_), lay(shine_)};
   }
 
-  [[nodiscard]] float opacityOf(const ChartCorners& c, const UvMap& uv, const glm::dvec2& cell) const {
-    const float stopped = 1.0F - passedPart(material_);
-    if (material_.alpha_mode == AlphaMode::kOpaque) return stopped;
-    const bool uniform = !texture_ && primitive_.color0.empty();
+  [[nodiscard]] glm::vec4 vertexColour(const ChartCorners& c, const glm::dvec2& p) const {
+    if (primitive_.color0.empty()) return glm::vec4(1.0F);
+    glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
+    w /= w.x + w.y + w.z;  // beyond an edge the rest would be more than all
+    const auto& color = primitive_.color0;
+    return color[c.vertex[0]] * w[0] + color[c.vertex[1]] * w[1] + color[c.vertex[2]] * w[2];
+  }
+
+  /// Of the light straight at it there, by channel.
+  [[nodiscard]] glm::vec3 passedAt(const Laid& laid, const glm::dvec2& p, const glm::vec4& vertex) const {
+    if (material_.transmission <= 0.0F) return glm::vec3(0.0F);
+    auto place = PassingPlace::of(material_);
+    place.base *= glm::vec3(vertex);
+    if (base_) place.base *= base_->pixels().colourAt(laid.base->at(p));
+    if (part_) place.transmission *= part_->pixels().colourAt(laid.part->at(p)).r;
+    if (metal_) place.metallic *= metal_->pixels().colourAt(laid.metal->at(p)).b;
+    if (shine_) place.specular *= shine_->pixels().colourAt(laid.shine->at(p));
+    return passedPart(material_, place);
+  }
+
+  /// How much of the surface is there.
+  [[nodiscard]] float coverageAt(const Laid& laid, const glm::dvec2& p, float vertex_alpha) const {
+    if (material_.alpha_mode == AlphaMode::kOpaque) return 1.0F;
+    float alpha = material_.alpha;
+    if (base_) alpha *= base_->pixels().alphaAt(laid.base->at(p));
+    alpha *= vertex_alpha;
+    if (material_.alpha_mode == AlphaMode::kMask) return alpha >= material_.alpha_cutoff ? 1.0F : 0.0F;
+    return std::clamp(alpha, 0.0F, 1.0F);
+  }
+
+  /// Over a cell, by channel, of the light straight at it.
+  [[nodiscard]] glm::vec3 stoppedBy(const Laid& laid, const glm::dvec2& cell) const {
+    const bool uniform = !base_ && !part_ && !metal_ && !shine_ && primitive_.color0.empty();
     const int side = uniform ? 1 : kSamples;
-    float sum = 0.0F;
+    glm::vec3 sum(0.0F);
     for (int y = 0; y < side; ++y) {
       for (int x = 0; x < side; ++x) {
         const glm::dvec2 at = (cell + (glm::dvec2(x, y) + 0.5) / double(side)) / double(surface_.opacity_scale);
-        const float alpha = alphaAt(c, uv, at);
-        const bool mask = material_.alpha_mode == AlphaMode::kMask;
-        sum += mask ? (alpha >= material_.alpha_cutoff ? 1.0F : 0.0F) : std::clamp(alpha, 0.0F, 1.0F);
+        const auto vertex = vertexColour(laid.corners, at);
+        sum += coverageAt(laid, at, vertex.a) * (1.0F - passedAt(laid, at, vertex));
       }
     }
-    return stopped * sum / static_cast<float>(side * side);
+    return sum / static_cast<float>(side * side);
   }
 
-  [[nodiscard]] std::uint8_t& cell(std::uint32_t x, std::uint32_t y) {
-    return patches_.opacity[surface_.first_opacity + std::size_t{y} * width_ + x];
+  [[nodiscard]] std::size_t cellAt(std::uint32_t x, std::uint32_t y) const {
+    return surface_.first_opacity + std::size_t{y} * width_ + x;
+  }
+  void setCell(std::size_t cell, const glm::vec3& stopped) {
+    patches_.opacity[cell] = byteOf(std::min({stopped.r, stopped.g, stopped.b}));
+    if (has_tints_) patches_.tints[cell - surface_.first_opacity + surface_.first_tint_cell] = tintOf(1.0F - stopped);
   }
 
   void fillTriangle(const ChartCorners& c, std::uint32_t first_row, std::uint32_t end_row) {
@@ -174,7 +258,7 @@ class SurfaceOpacity {
     const auto [low, high] = extentOf(c);
     const auto end_x = std::min(width_, static_cast<std::uint32_t>(std::ceil(std::max(high.x, 0.0))));
     const auto end_y = std::min(end_row, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
-    const UvMap uv(c, texcoords());
+    const auto laid = over(c);
     const std::array<glm::dvec2, 3> cells{c.texel[0] * scale, c.texel[1] * scale, c.texel[2] * scale};
     for (auto y = std::max(first_row, static_cast<std::uint32_t>(std::max(low.y, 0.0))); y < end_y; ++y) {
       interruptionPoint();
@@ -185,21 +269,26 @@ class SurfaceOpacity {
            x < end; ++x) {
         const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
-        cell(x, y) = byteOf(opacityOf(c, uv, glm::dvec2(x, y)));
+        setCell(cellAt(x, y), stoppedBy(laid, glm::dvec2(x, y)));
         known_[std::size_t{y} * width_ + x] = 1;
       }
     }
   }
 
-  [[nodiscard]] std::uint8_t neighbour(std::uint32_t x, std::uint32_t y) {
+  void fillLikeNeighbour(std::uint32_t x, std::uint32_t y) {
     for (std::uint32_t ny = y == 0 ? 0 : y - 1; ny < std::min(y + 2, height_); ++ny) {
       for (std::uint32_t nx = x == 0 ? 0 : x - 1; nx < std::min(x + 2, width_); ++nx) {
-        if (known_[std::size_t{ny} * width_ + nx] != 0) return cell(nx, ny);
+        if (known_[std::size_t{ny} * width_ + nx] == 0) continue;
+        const auto to = cellAt(x, y), from = cellAt(nx, ny);
+        patches_.opacity[to] = patches_.opacity[from];
+        const auto tint = surface_.first_tint_cell - surface_.first_opacity;  // as unsigned numbers wrap
+        if (has_tints_) patches_.tints[to + tint] = patches_.tints[from + tint];
+        return;
       }
     }
     // Slivers that hold no cell's middle: as the surface would be without a texture.
-    const float alpha = material_.alpha_mode == AlphaMode::kBlend ? material_.alpha : 1.0F;
-    return byteOf(alpha * (1.0F - passedPart(material_)));
+    const float coverage = material_.alpha_mode == AlphaMode::kBlend ? material_.alpha : 1.0F;
+    setCell(cellAt(x, y), coverage * (1.0F - passedPart(material_, PassingPlace::of(material_))));
   }
 
   PatchScene& patches_;
@@ -207,8 +296,8 @@ class SurfaceOpacity {
   const Material& material_;
   const Instance& instance_;
   const Primitive& primitive_;
-  std::optional<AlphaTexture> texture_;
-  glm::dvec2 texture_size_{0.0};
+  std::optional<LaidTexture> base_, part_, metal_, shine_;
+  bool has_tints_ = false;
   std::uint32_t width_ = 0, height_ = 0;
   std::vector<std::uint8_t> known_;  // by cell
   struct Rows {
@@ -236,26 +325,68 @@ void chooseScales(PatchScene& patches, std::vector<SurfaceOpacity>& some) {
       cells += one.cellCount();
     }
   }
-  if (coarser) patches.warnings.emplace_back("cut-outs are coarser than their textures: there are too many of them");
+  if (coarser)
+    patches.warnings.emplace_back(
+        "cut-outs, and panes with textures, are coarser than these: there are too many of them");
   patches.opacity.assign(cells, 255);
   std::uint64_t first = 0;
   for (auto& one : some) {
     one.surface().first_opacity = static_cast<std::uint32_t>(first);
     first += one.cellCount();
   }
+  first = 0;
+  for (auto& one : some) {
+    if (!one.mayTint()) continue;
+    one.surface().first_tint_cell = static_cast<std::uint32_t>(first);
+    first += one.cellCount();
+  }
+  patches.tints.assign(first, kWhite);
+}
+
+/// Calls visit(cell) for each cell of a leaf.
+template <typename Visit>
+void forCellsOf(const Surface& surface, std::uint32_t leaf, const Visit& visit) {
+  const std::uint32_t scale = surface.opacity_scale, width = surface.width * scale;
+  const std::uint32_t x0 = leaf % surface.width * scale, y0 = leaf / surface.width * scale;
+  for (std::uint32_t y = y0; y < y0 + scale; ++y) {
+    for (std::uint32_t x = x0; x < x0 + scale; ++x) visit(surface.first_opacity + std::size_t{y} * width + x);
+  }
+}
+
+/// Of what passes a leaf: by chance as much as of the channel that passes best at each place.
+glm::vec3 leafTint(const PatchScene& patches, const Surface& surface, std::uint32_t leaf) {
+  glm::dvec3 passes(0.0);
+  double most = 0.0;
+  forCellsOf(surface, leaf, [&](std::size_t cell) {
+    const double passed = 255.0 - static_cast<double>(patches.opacity[cell]);
+    most += passed;
+    const auto& tint = patches.tints[cell - surface.first_opacity + surface.first_tint_cell];
+    passes += passed * glm::dvec3(tint) / static_cast<double>(PatchScene::kTintSteps);
+  });
+  return most > 0.0 ? glm::vec3(passes / most) : glm::vec3(1.0F);
+}
+
+/// Of surfaces that are coloured anywhere.
+void measureTints(PatchScene& patches) {
+  if (patches.tints.empty()) return;
+  for (Surface& surface : patches.surfaces) {
+    if (!surface.see_through || surface.first_tint_cell == kNone) continue;
+    interruptionPoint();
+    const auto cells = std::size_t{surface.width} * surface.height * surface.opacity_scale * surface.opacity_scale;
+    const auto of = std::span(patches.tints).subspan(surface.first_tint_cell, cells);
+    if (std::ranges::all_of(of, [](const glm::u16vec3& tint) { return tint == kWhite; })) continue;
+    surface.first_tint = static_cast<std::uint32_t>(patches.leaf_tints.size());
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
+      patches.leaf_tints.push_back(leafTint(patches, surface, leaf));
+  }
+  if (patches.leaf_tints.empty()) patches.tints = {};
 }
 
 /// Mean over the cells of a leaf, in [0, 1].
 float leafOpacity(const PatchScene& patches, const Surface& surface, std::uint32_t leaf) {
-  const std::uint32_t scale = surface.opacity_scale, width = surface.width * scale;
-  const std::uint32_t x0 = leaf % surface.width * scale, y0 = leaf / surface.width * scale;
   std::uint64_t sum = 0;
-  for (std::uint32_t y = y0; y < y0 + scale; ++y) {
-    for (std::uint32_t x = x0; x < x0 + scale; ++x) {
-      sum += patches.opacity[surface.first_opacity + std::size_t{y} * width + x];
-    }
-  }
-  return static_cast<float>(static_cast<double>(sum) / (255.0 * scale * scale));
+  forCellsOf(surface, leaf, [&](std::size_t cell) { sum += patches.opacity[cell]; });
+  return static_cast<float>(static_cast<double>(sum) / (255.0 * surface.opacity_scale * surface.opacity_scale));
 }
 
 }  // namespace
@@ -284,6 +415,7 @@ void measureOpacity(const Scene& scene, PatchScene& patches) {
   }
   inTurns(parts.size(), [&](std::size_t i) { some[parts[i].of].fill(parts[i].first, parts[i].end); });
   inTurns(some.size(), [&](std::size_t i) { some[i].fillBorders(); });
+  measureTints(patches);
 }
 
 void applyOpacity(PatchScene& patches) {

@@ -1,7 +1,5 @@
 #include "server/scene/shading/shade_layers.h"
 
-#include "server/scene/shading/specular.h"
-
 namespace radiosity::scene {
 namespace {
 
@@ -19,9 +17,9 @@ bool laidAlike(TextureUse a, const TextureUse& b) {
 MaterialLayers::MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids)
     : scene_(scene), material_(material) {
   is_specular_ = isSpecular(material_);
-  stopped_ = stoppedDiffuse();
   addSurface(pyramids);
   if (is_specular_) addSpecularLooks(pyramids);
+  if (material_.transmission > 0.0F) addPassLooks(pyramids);
   if (material_.emission != glm::vec3(0.0F)) addEmissive(pyramids);
   if (material_.isTranslucent()) addTransmission(pyramids);
 }
@@ -92,15 +90,24 @@ void MaterialLayers::addSpecularLooks(TexturePyramids& pyramids) {
   specular_look_.shine = layerOf(material_.specular_texture, material_.specular != glm::vec3(0.0F));
 }
 
+void MaterialLayers::addPassLooks(TexturePyramids& pyramids) {
+  const auto layerOf = [&](const TextureUse& use) {
+    const Texture* texture = textureOf(use);
+    return texture != nullptr ? std::optional<Layer>({use, pyramids.of({.colour = texture})}) : std::nullopt;
+  };
+  pass_look_ = {layerOf(material_.base_color_texture), layerOf(material_.metallic_texture),
+                layerOf(material_.specular_texture), layerOf(material_.transmission_texture)};
+}
+
 /// `value.reflectance`: what the surface reflects diffusely. Of metal the rest is what the base colour has more, which
 /// holds also where both vary within the place.
 void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough,
-                                 Value& value) const {
+                                 const PassingPlace& passing, Value& value) const {
   value.lobe.x = std::clamp(material_.roughness * rough, 0.0F, 1.0F);
   if (isGlass(material_)) {
     const auto face = glassFace(material_);
     value.specular = glm::vec3(face.facing);
-    value.lobe.z = enteredPart(material_);
+    value.lobe.z = mostOf(enteredPart(material_, passing));
   } else if (material_.specular != glm::vec3(0.0F)) {
     value.specular = material_.specular * shine;
     value.lobe.y = std::max({value.specular.r, value.specular.g, value.specular.b});
@@ -112,22 +119,21 @@ void MaterialLayers::addSpecular(const glm::vec3& base, float metal, const glm::
 
 /// The part that is scattered, reflected or passed on, of the light that neither passes nor is reflected as by a
 /// mirror: as a part of what does not pass, for rays that do not pass are what meets it.
-float MaterialLayers::stoppedDiffuse() const {
-  if (material_.transmission <= 0.0F) return 1.0F;
-  if (!isGlass(material_))
-    return (1.0F - material_.transmission) / std::max(1.0F - passedPart(material_), kLeastStopped);
+float MaterialLayers::stoppedDiffuse(const PassingPlace& passing) const {
+  if (passing.transmission <= 0.0F) return 1.0F;
+  const float passed = mostOf(passedPart(material_, passing));
+  if (!isGlass(material_)) return (1.0F - passing.transmission) / std::max(1.0F - passed, kLeastStopped);
   const auto face = glassFace(material_);
-  const float stopped = face.meanStopped(1.0F - passedPart(material_)),
-              reflected = face.meanStopped(face.reflectance(0.0F));
-  return stopped > 0.0F ? (1.0F - material_.transmission) * (1.0F - reflected) / stopped : 0.0F;
+  const float stopped = face.meanStopped(1.0F - passed), reflected = face.meanStopped(face.reflectance(0.0F));
+  return stopped > 0.0F ? (1.0F - passing.transmission) * (1.0F - reflected) / stopped : 0.0F;
 }
 
 /// Rays that do not pass meet what is left, as parts of these.
-void MaterialLayers::takePassing(Value& value) const {
-  value.reflectance *= stopped_;
-  if (material_.transmission <= 0.0F || isGlass(material_)) return;
-  const float stopped = std::max(1.0F - passedPart(material_), kLeastStopped);
-  value.specular = glm::min(value.specular / stopped, glm::vec3(1.0F));
+void MaterialLayers::takePassing(const PassingPlace& passing, float stopped, Value& value) const {
+  value.reflectance *= stopped;
+  if (passing.transmission <= 0.0F || isGlass(material_)) return;
+  const float met = std::max(1.0F - mostOf(passedPart(material_, passing)), kLeastStopped);
+  value.specular = glm::min(value.specular / met, glm::vec3(1.0F));
 }
 
 void MaterialLayers::addEmissive(TexturePyramids& pyramids) {

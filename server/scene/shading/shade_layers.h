@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "server/scene/shading/specular.h"
 #include "server/scene/shading/texture_pyramids.h"
 
 namespace radiosity::scene {
@@ -29,7 +30,8 @@ class MaterialLayers {
 
   /// Without textures it is the same everywhere, but for vertex colours.
   [[nodiscard]] bool hasTextures() const {
-    return surface_ || metallic_ || specular_ || emissive_ || passing_ || glow_ || specular_look_.rough;
+    return surface_ || metallic_ || specular_ || emissive_ || passing_ || glow_ || specular_look_.rough ||
+           pass_look_.part;
   }
 
   /// `place(use)` gives the Place of a texture; `vertex` is COLOR_0 there.
@@ -52,19 +54,24 @@ class MaterialLayers {
       value.reflectance *= found.rgb;
       value.weight *= found.coverage;
     }
-    if (is_specular_) {
-      const auto lookOr1 = [&](const std::optional<Layer>& layer) {
-        return layer ? look(*layer).rgb : glm::vec3(1.0F);
-      };
+    const auto lookOr1 = [&](const std::optional<Layer>& layer) { return layer ? look(*layer).rgb : glm::vec3(1.0F); };
+    PassingPlace passing;
+    if (material_.transmission > 0.0F) {
+      passing.base = material_.base_color * glm::vec3(vertex) * lookOr1(pass_look_.base);
+      passing.transmission = material_.transmission * lookOr1(pass_look_.part).r;
+      passing.metallic = material_.metallic * lookOr1(pass_look_.metal).b;
+      passing.specular = material_.specular * lookOr1(pass_look_.shine);
+    }
+    if (is_specular_)
       addSpecular(material_.base_color * glm::vec3(vertex) * lookOr1(specular_look_.base),
                   lookOr1(specular_look_.metal).b, lookOr1(specular_look_.shine), lookOr1(specular_look_.rough).g,
-                  value);
-    }
-    takePassing(value);
+                  passing, value);
+    const float stopped = stoppedDiffuse(passing);
+    takePassing(passing, stopped, value);
     if (emissive_) value.emission *= look(*emissive_).rgb;
     if (material_.isTranslucent()) {
       const float part = material_.diffuse_transmission * (passing_ ? look(*passing_).coverage : 1.0F);
-      value.transmittance = material_.diffuse_transmission_color * (diffuse * stopped_ * part);
+      value.transmittance = material_.diffuse_transmission_color * (diffuse * stopped * part);
       if (glow_) value.transmittance *= look(*glow_).rgb;
       value.base_reflectance = value.reflectance;
       value.reflectance *= 1.0F - part;
@@ -82,10 +89,12 @@ class MaterialLayers {
   [[nodiscard]] static float diffuseOf(float metal, const glm::vec3& specular) {
     return (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
   }
-  void addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough, Value& value) const;
-  [[nodiscard]] float stoppedDiffuse() const;
-  void takePassing(Value& value) const;
+  void addSpecular(const glm::vec3& base, float metal, const glm::vec3& shine, float rough, const PassingPlace& passing,
+                   Value& value) const;
+  [[nodiscard]] float stoppedDiffuse(const PassingPlace& passing) const;
+  void takePassing(const PassingPlace& passing, float stopped, Value& value) const;
   void addSpecularLooks(TexturePyramids& pyramids);
+  void addPassLooks(TexturePyramids& pyramids);
   [[nodiscard]] float weightOf(float vertex_alpha) const;
   [[nodiscard]] const Texture* textureOf(const TextureUse& use) const;
   void setAlpha(const Texture* alpha, PictureStack& stack) const;
@@ -102,11 +111,14 @@ class MaterialLayers {
   std::optional<Layer> metallic_, specular_, emissive_;     ///< by themselves
   std::optional<Layer> passing_, glow_;                     ///< of diffuse transmission: how much, and its colour
   bool is_specular_ = false;
-  float stopped_ = 1.0F;  ///< see stoppedDiffuse()
   struct SpecularLook {
     std::optional<Layer> base, metal, shine, rough;
   };
   SpecularLook specular_look_;  ///< of a material that is: each texture by itself
+  struct PassLook {
+    std::optional<Layer> base, metal, shine, part;
+  };
+  PassLook pass_look_;  ///< likewise, of one that light passes
 };
 
 }  // namespace radiosity::scene

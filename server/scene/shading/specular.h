@@ -7,13 +7,15 @@
 // less than kLeastSpecular, and for dielectrics of KHR_materials_pbrSpecularGlossiness, whose specular colour is small.
 //
 // Glass (KHR_materials_transmission on an opaque material) reflects by Fresnel's law at each face, from both sides, and
-// light that is not reflected goes straight on, by chance, as far as transmission and tint let it, of which luminance
-// counts. So a face is one interface, and a pane with two faces has two. That a ball of glass gathers light is not
-// followed. The unlit back of a single-sided face that only passes and reflects does so as the front; where some of the
-// light is scattered as well, the back absorbs what does not pass, as any unlit back.
+// light that is not reflected goes straight on as far as transmission and tint let it: by chance, as much as of the
+// channel that passes best, and of the others as much less as the tint says (PatchScene::tints). So a face is one
+// interface, and a pane with two faces has two. That a ball of glass gathers light is not followed. The unlit back of a
+// single-sided face that only passes and reflects does so as the front; where some of the light is scattered as well,
+// the back absorbs what does not pass, as any unlit back.
 #pragma once
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 
@@ -41,26 +43,38 @@ inline constexpr float kLeastSpecular = 0.05F;
 [[nodiscard]] inline GlassFace glassFace(const Material& material) {
   if (!isGlass(material)) return {};
   constexpr float kAll = 0.999F;
-  const bool only_passes = material.transmission >= kAll && material.emission == glm::vec3(0.0F);
+  const bool only_passes = material.transmission >= kAll && material.transmission_texture.texture == kNone &&
+                           material.emission == glm::vec3(0.0F);
   return {facingReflectance(material.ior), !material.double_sided && only_passes};
 }
 
-/// Part of the light that enters a face, by luminance, that goes on through it.
-[[nodiscard]] inline float enteredPart(const Material& material) {
-  if (material.transmission <= 0.0F) return 0.0F;
-  const glm::vec3 tint =
-      material.base_color * glm::sqrt(material.attenuation);  // the other half is that of another face
-  const float bright = glm::dot(tint, glm::vec3(0.2126F, 0.7152F, 0.0722F));
-  // Of a mask of metal that varies nobody knows here where it is; the factor alone is often 1 for all of it.
-  const float metallic = material.metallic_texture.texture == kNone ? material.metallic : 0.0F;
-  const float shine = std::max({material.specular.r, material.specular.g, material.specular.b});
-  return std::clamp(material.transmission * (1.0F - metallic) * (1.0F - shine) * bright, 0.0F, 1.0F);
+/// What a material has at a place, of what decides how much passes.
+struct PassingPlace {
+  glm::vec3 base{1.0F};  ///< base colour, of factor, vertices and texture
+  float transmission = 0.0F, metallic = 0.0F;
+  glm::vec3 specular{0.0F};
+
+  /// Where no texture and no vertex says otherwise.
+  [[nodiscard]] static PassingPlace of(const Material& material) {
+    return {material.base_color, material.transmission, material.metallic, material.specular};
+  }
+};
+
+/// Part of the light that enters a face there, by channel, that goes on through it.
+[[nodiscard]] inline glm::vec3 enteredPart(const Material& material, const PassingPlace& at) {
+  if (at.transmission <= 0.0F) return glm::vec3(0.0F);
+  const glm::vec3 tint = at.base * glm::sqrt(material.attenuation);  // the other half is that of another face
+  const float shine = std::max({at.specular.r, at.specular.g, at.specular.b});
+  return glm::clamp(at.transmission * (1.0F - at.metallic) * (1.0F - shine) * tint, 0.0F, 1.0F);
 }
 
-/// Part of the light straight at a face, by luminance, that goes on through it.
-[[nodiscard]] inline float passedPart(const Material& material) {
-  return enteredPart(material) * (1.0F - glassFace(material).reflectance(0.0F));
+/// Part of the light straight at a face, by channel, that goes on through it.
+[[nodiscard]] inline glm::vec3 passedPart(const Material& material, const PassingPlace& at) {
+  return enteredPart(material, at) * (1.0F - glassFace(material).reflectance(0.0F));
 }
+
+/// Of the channel of which most does.
+[[nodiscard]] inline float mostOf(const glm::vec3& colour) { return std::max({colour.r, colour.g, colour.b}); }
 
 [[nodiscard]] inline bool isSpecular(const Material& material) {
   return material.metallic > 0.0F || material.specular != glm::vec3(0.0F) || isGlass(material);

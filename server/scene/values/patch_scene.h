@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
+#include <glm/ext/vector_uint3_sized.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -86,10 +87,12 @@ struct Surface {
       false;           ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
   bool emits = false;  ///< some of it does (emitters.h): of surfaces in one place it is seen
   GlassFace glass;     ///< how what PatchScene::opacity says for light straight at it depends on the angle
-  std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
-  std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
-  float texel_area = 0.0F;          ///< area of a full leaf, unit box squared
-  float detail = 1.0F;              ///< its texels are about so many times as fine as PatchScene::texel
+  std::uint32_t opacity_scale = 1;        ///< cells of the opacity grid across a leaf
+  std::uint32_t first_opacity = 0;        ///< of width x opacity_scale by height x opacity_scale cells, row-major
+  std::uint32_t first_tint_cell = kNone;  ///< of PatchScene::tints, as many cells; kNone: it may not tint
+  std::uint32_t first_tint = kNone;       ///< of PatchScene::leaf_tints; kNone: what passes keeps its colour
+  float texel_area = 0.0F;                ///< area of a full leaf, unit box squared
+  float detail = 1.0F;                    ///< its texels are about so many times as fine as PatchScene::texel
 };
 
 struct Page {
@@ -117,6 +120,12 @@ struct PatchScene {
   /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
   std::vector<float> node_area;
   std::vector<std::uint8_t> opacity;  ///< grids of the surfaces that one can see through; 255: lets nothing through
+  /// Of coloured glass `opacity` is that of the channel that passes best; of the others these parts pass of that, in
+  /// steps of 1/kTintSteps, by cell from Surface::first_tint_cell on; empty: nothing is coloured. Of whole leaves: by
+  /// leaf of surfaces with Surface::first_tint.
+  static constexpr std::uint16_t kTintSteps = 65535;
+  std::vector<glm::u16vec3> tints;
+  std::vector<glm::vec3> leaf_tints;
   std::vector<Page> pages;
 
   /// A few black texels, which all sides share that are seen and never lit. page kNone: there is no such side.
@@ -168,13 +177,23 @@ struct PatchScene {
 
   /// How much a place of a surface that one can see through holds back; 255: all.
   [[nodiscard]] std::uint8_t opacityAt(const Surface& surface, const glm::vec2& texel) const {
+    return opacity[opacityCell(surface, texel)];
+  }
+  /// Which of the cells a place lies in.
+  [[nodiscard]] std::size_t opacityCell(const Surface& surface, const glm::vec2& texel) const {
     const auto cell = [&](float place, std::uint32_t leaves) {
       const auto scaled =
           static_cast<std::uint32_t>((place > 0.0F ? place : 0.0F) * static_cast<float>(surface.opacity_scale));
       return scaled < leaves * surface.opacity_scale ? scaled : leaves * surface.opacity_scale - 1;
     };
     const auto row = std::size_t{cell(texel.y, surface.height)} * surface.width * surface.opacity_scale;
-    return opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
+    return surface.first_opacity + row + cell(texel.x, surface.width);
+  }
+  /// Of what passes there, by chance or in part, what is left.
+  [[nodiscard]] glm::vec3 tintAt(const Surface& surface, const glm::vec2& texel) const {
+    if (surface.first_tint == kNone) return glm::vec3(1.0F);
+    const auto cell = opacityCell(surface, texel) - surface.first_opacity + surface.first_tint_cell;
+    return glm::vec3(tints[cell]) / static_cast<float>(kTintSteps);
   }
   /// Part of the light travelling along `direction`, of whatever length, that a surface one can see through stops at a
   /// place of a triangle.

@@ -62,9 +62,10 @@ struct Material {
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   bool double_sided = false;
   TextureUse base_color_texture, emissive_texture;
-  TextureUse metallic_texture;   ///< its blue channel multiplies `metallic`
-  TextureUse roughness_texture;  ///< its green channel multiplies `roughness`; of metal alone
-  TextureUse specular_texture;   ///< RGB multiplies `specular`
+  TextureUse metallic_texture;      ///< its blue channel multiplies `metallic`
+  TextureUse roughness_texture;     ///< its green channel multiplies `roughness`; of metal alone
+  TextureUse specular_texture;      ///< RGB multiplies `specular`
+  TextureUse transmission_texture;  ///< its red channel multiplies `transmission`
   /// KHR_materials_diffuse_transmission: of the light that is not reflected specularly the part that leaves diffusely
   /// on the other side, and its colour, linear. Above 0: `double_sided`.
   float diffuse_transmission = 0.0F;

@@ -86,26 +86,33 @@ glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
   return use.offset + glm::vec2(c * s.x + d * s.y, -d * s.x + c * s.y);
 }
 
-AlphaTexture::AlphaTexture(const Texture& texture, const TextureUse& use)
-    : texture_(texture), use_(use), has_pixels_(hasPixels(texture)) {
+PlainTexture::PlainTexture(const Texture& texture, const TextureUse& use)
+    : texture_(&texture), use_(&use), has_pixels_(hasPixels(texture)) {
   const float c = std::cos(use.rotation), d = std::sin(use.rotation);
   turn_ = {c * use.scale.x, -d * use.scale.x, d * use.scale.y, c * use.scale.y};
 }
 
-float AlphaTexture::at(const glm::vec2& uv) const {
-  const glm::vec2 turned = use_.offset + turn_ * uv;
-  if (!has_pixels_ || !std::isfinite(turned.x) || !std::isfinite(turned.y)) return 1.0F;
-  const Lookup lookup = lookupAt(use_, turned, texture_.width, texture_.height, use_.nearest);
-  const auto at = [&](int dx, int dy) {
-    const int x = wrap(lookup.x + dx, texture_.width, use_.repeat_u, use_.mirror_u);
-    const int y = wrap(lookup.y + dy, texture_.height, use_.repeat_v, use_.mirror_v);
-    const auto index =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(texture_.width) + static_cast<std::size_t>(x);
-    return static_cast<float>(texture_.rgba[4 * index + 3]) / 255.0F;
+/// `pixel(x, y)`: a value of the texture.
+template <typename Value, typename Pixel>
+Value PlainTexture::filtered(const glm::vec2& uv, const Pixel& pixel) const {
+  const glm::vec2 turned = use_->offset + turn_ * uv;
+  if (!has_pixels_ || !std::isfinite(turned.x) || !std::isfinite(turned.y)) return Value(1.0F);
+  const Lookup lookup = lookupAt(*use_, turned, texture_->width, texture_->height, use_->nearest);
+  const auto at = [&](int dx, int dy) -> Value {
+    return pixel(wrap(lookup.x + dx, texture_->width, use_->repeat_u, use_->mirror_u),
+                 wrap(lookup.y + dy, texture_->height, use_->repeat_v, use_->mirror_v));
   };
-  if (use_.nearest) return at(0, 0);
+  if (use_->nearest) return at(0, 0);
   return glm::mix(glm::mix(at(0, 0), at(1, 0), lookup.next.x), glm::mix(at(0, 1), at(1, 1), lookup.next.x),
                   lookup.next.y);
+}
+
+float PlainTexture::alphaAt(const glm::vec2& uv) const {
+  return filtered<float>(uv, [&](int x, int y) { return pixelOf(*texture_, x, y).a; });
+}
+
+glm::vec3 PlainTexture::colourAt(const glm::vec2& uv) const {
+  return filtered<glm::vec3>(uv, [&](int x, int y) { return glm::vec3(pixelOf(*texture_, x, y)); });
 }
 
 TexturePyramid::TexturePyramid(const Texture& texture)

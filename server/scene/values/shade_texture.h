@@ -76,17 +76,23 @@ class TexturePyramid {
 /// uv -> offset + rotate(scale * uv), KHR_texture_transform.
 [[nodiscard]] glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv);
 
-/// Alpha of a texture. Refers to it, and to its use.
-class AlphaTexture {
+/// A texture at its own resolution. Refers to it, and to its use.
+class PlainTexture {
  public:
-  AlphaTexture(const Texture& texture, const TextureUse& use);
+  PlainTexture(const Texture& texture, const TextureUse& use);
 
-  /// Around `uv` (after TextureUse's transform and wrapping), as it is filtered, in [0, 1]; 1 where it has no pixels.
-  [[nodiscard]] float at(const glm::vec2& uv) const;
+  /// Alpha around `uv` (after TextureUse's transform and wrapping), as it is filtered, in [0, 1]; 1 where it has no
+  /// pixels.
+  [[nodiscard]] float alphaAt(const glm::vec2& uv) const;
+  /// RGB there, linear, each in [0, 1]; 1 where it has no pixels.
+  [[nodiscard]] glm::vec3 colourAt(const glm::vec2& uv) const;
 
  private:
-  const Texture& texture_;
-  const TextureUse& use_;
+  template <typename Value, typename Pixel>
+  [[nodiscard]] Value filtered(const glm::vec2& uv, const Pixel& pixel) const;
+
+  const Texture* texture_;
+  const TextureUse* use_;
   bool has_pixels_;
   glm::mat2 turn_;  ///< after which comes TextureUse::offset
 };

@@ -163,14 +163,15 @@ LampImages::Look LampImages::look(const Image& image, const LeafRays::Place& pla
   const auto nearest = glm::clamp(crossing, plane.low, plane.high);
   if (glm::distance(nearest, crossing) > kRounding) return look;
   const auto arrival = rays_->arriveAt(place, crossing);
-  if (!(arrival.part > 0.0) || arrival.end.value == LeafRays::kNothing ||
+  if (!(arrival.passage.part > 0.0) || arrival.end.value == LeafRays::kNothing ||
       flat_->planeOf(arrival.end.value) != image.plane)
     return look;
-  const double open = rays_->openPart(arrival.end, behind.position + unhidden.way);
-  if (open <= 0.0) return look;
+  const auto open = rays_->passageTo(arrival.end, behind.position + unhidden.way);
+  if (open.part <= 0.0) return look;
   const double cosine = rise / glm::length(unhidden.way);
   const auto edge = scene::GlassFace::edgeOf(static_cast<float>(cosine));
-  look.seen = look.weight * arrival.part * open * glm::dvec3(mirrors_->reflectance(arrival.end.value, edge));
+  look.seen =
+      look.weight * arrival.passage.light() * open.light() * glm::dvec3(mirrors_->reflectance(arrival.end.value, edge));
   return look;
 }
 

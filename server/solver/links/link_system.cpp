@@ -128,6 +128,7 @@ std::uint32_t LinkSystem::add(const Shooter& shooter) {
 
 void LinkSystem::forget(std::uint32_t index) {
   shooters_[index].column = {};
+  shooters_[index].tint = {};
   shooters_[index].products = {};
   for (auto& half : halves_) {
     for (auto& row : half.matrix) {
@@ -182,17 +183,55 @@ void LinkSystem::updateMeans() {
 }
 
 void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, From from) const {
-  std::array<std::vector<float>, 3> planes;
+  std::array<std::vector<float>, 3> planes, tinted;
   for (auto& plane : planes) plane.assign(leaf_area_.size(), 0.0F);
+  const auto pointers = [](auto& of) { return std::array<float*, 3>{of[0].data(), of[1].data(), of[2].data()}; };
   for (const auto& shooter : shooters_) {
     if (from == From::kLights && !shooter.isLight()) continue;
     if (from == From::kSources && shooter.source == scene::kNone) continue;
     const glm::vec3 sent = static_cast<float>(shooter.carried(half)) * shooter.sent[half];
     if (sent == glm::vec3(0.0F)) continue;
-    shooter.column[half].apply({sent.x, sent.y, sent.z}, {planes[0].data(), planes[1].data(), planes[2].data()});
+    const auto& column = shooter.column[half];
+    if (!shooter.tint[half]) {
+      column.apply({sent.x, sent.y, sent.z}, pointers(planes));
+      continue;
+    }
+    for (auto& plane : tinted) plane.resize(leaf_area_.size(), 0.0F);  // all 0
+    column.apply({sent.x, sent.y, sent.z}, pointers(tinted));
+    shooter.tint[half]->apply(pointers(tinted));
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (const auto& run : column.runs()) {
+        for (auto v = run.first_value; v < run.first_value + run.count; ++v)
+          planes[c][v] += std::exchange(tinted[c][v], 0.0F);
+      }
+    }
   }
   values.resize(leaf_area_.size());
   for (std::size_t v = 0; v < values.size(); ++v) values[v] = {planes[0][v], planes[1][v], planes[2][v]};
+}
+
+double LinkSystem::tintNoise() const {
+  double square = 0.0;
+  std::array<std::vector<float>, 6> light;
+  for (const auto& shooter : shooters_) {
+    if (!shooter.tint[0] && !shooter.tint[1]) continue;
+    for (auto& plane : light) plane.assign(leaf_area_.size(), 0.0F);
+    const auto& column = shooter.column[shooter.column[0].points() > 0.0 ? 0 : 1];
+    const glm::vec3 sent = 0.5F * (shooter.sent[0] + shooter.sent[1]);
+    for (std::size_t half = 0; half < 2; ++half) {
+      const std::array<float*, 3> planes{light[3 * half].data(), light[3 * half + 1].data(),
+                                         light[3 * half + 2].data()};
+      column.apply({sent.x, sent.y, sent.z}, planes);
+      if (shooter.tint[half]) shooter.tint[half]->apply(planes);
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t v = 0; v < leaf_area_.size(); ++v) {
+        const auto off = 0.5 * static_cast<double>(light[c][v] - light[3 + c][v]);
+        square += static_cast<double>(leaf_area_[v]) * off * off;
+      }
+    }
+  }
+  return square;
 }
 
 std::size_t LinkSystem::bytes() const {

@@ -18,6 +18,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,18 +26,22 @@
 #include "server/solver/patches/passing.h"
 #include "server/solver/patches/side.h"
 #include "server/solver/transport/link_column.h"
+#include "server/solver/transport/link_tint.h"
 
 namespace radiosity::solver {
 
 struct Shooter {
-  NodePlace place;                         ///< of a node; of a light only one of the following three counts
-  std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
-  std::uint32_t source = scene::kNone;     ///< index of the light without extent, or kNone; `area` is its flux for one
-  std::uint32_t crowd = scene::kNone;      ///< index of the crowd of lamps, or kNone; `area` is its flux for one
-  bool certain = false;                    ///< never plays roulette
-  std::uint32_t resolution = 0;            ///< N of a node's item buffers
-  double area = 0.0;                       ///< that shines, unit box squared
-  std::array<LinkColumn, 2> column;        ///< by half
+  NodePlace place;                      ///< of a node; of a light only one of the following three counts
+  std::uint32_t light = scene::kNone;   ///< index of the light polygon, or kNone
+  std::uint32_t source = scene::kNone;  ///< index of the light without extent, or kNone; `area` is its flux for one
+  std::uint32_t crowd = scene::kNone;   ///< index of the crowd of lamps, or kNone; `area` is its flux for one
+  bool certain = false;                 ///< never plays roulette
+  std::uint32_t resolution = 0;         ///< N of a node's item buffers
+  double area = 0.0;                    ///< that shines, unit box squared
+  std::array<LinkColumn, 2> column;     ///< by half
+  /// By half: of what comes through coloured glass; null: all has its own colour. Not saved. The equation among
+  /// shooters does without: where rays gather, what nodes have less than they shoot is sent again, negative.
+  std::array<std::shared_ptr<const LinkTint>, 2> tint;
   std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half
   std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
   std::array<glm::vec3, 2> sent{};         ///< the same as it is shot, before the weight
@@ -135,6 +140,8 @@ class LinkSystem {
   /// those of them that are no surfaces.
   enum class From { kAll, kLights, kSources };
   void irradiance(std::size_t half, std::vector<glm::vec3>& values, From from = From::kAll) const;
+  /// Square of the error of the mean of the halves that their tints leave: sum over leaves and channels, times area.
+  [[nodiscard]] double tintNoise() const;
   /// What all links take.
   [[nodiscard]] std::size_t bytes() const;
   /// Rows of the equation in each half, and how many a node of the side has.

@@ -331,7 +331,8 @@ EnergyParts LinkedSolver::energy() const {
     parts.unshot[c] -= sent_for[c];
     parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.specular[c] - parts.escaped[c] -
                          parts.backface[c] - parts.unshot[c];
-    if (mirrors_ && mirrors_->hasGlass() && gathers()) parts.specular[c] += std::exchange(parts.imbalance[c], 0.0);
+    if (mirrors_ && (mirrors_->hasGlass() || !patches_->tints.empty()) && gathers())
+      parts.specular[c] += std::exchange(parts.imbalance[c], 0.0);
   }
   return parts;
 }

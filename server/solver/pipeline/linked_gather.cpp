@@ -45,7 +45,8 @@ constexpr double kAlone = 1.5;
 constexpr double kSampleGain = 0.97;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
-/// Of the room, what the noise of images of lamps in mirrors may take: it falls faster than that of rays.
+/// Of the room, what the noise of images of lamps in mirrors may take, and that of colours of lamps: they fall faster
+/// than that of rays.
 constexpr double kImages = 0.2;
 
 }  // namespace
@@ -267,7 +268,7 @@ LinkedSolver::Noise LinkedSolver::noise() const {
   const double norm = fieldNorm(), square = norm * norm, all = by_links_ * by_links_;
   if (!gather_ || square <= 0.0) return {0.0, all};
   const double rays = gather_->rayNoise() / square, smoothed = gather_->smoothedSquare() / square;
-  const double links = std::max(0.0, all - smoothed - rays - gather_->imageNoise() / square);
+  const double links = std::max(0.0, all - smoothed - rays - (gather_->imageNoise() + tint_noise_) / square);
   const double share = rays + links > 0.0 ? smoothed / (rays + links) : 0.0;
   return {rays * (1.0 + share), links * (1.0 + share)};
 }
@@ -296,10 +297,12 @@ StepOutcome LinkedSolver::chooseRays() {
   const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
   // What is in doubt is no reason for the rest to be mottled.
   if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
-  const double norm = fieldNorm(), of_images = gather_->imageNoise() / std::max(norm * norm, 1e-300);
+  const double norm = fieldNorm(), square = std::max(norm * norm, 1e-300);
+  const double of_images = gather_->imageNoise() / square, of_tints = tint_noise_ / square;
   if (of_images > kImages * room && gather_->refineImages(of_images / (kImages * room))) return StepOutcome::kRoundDone;
+  if (of_tints > kImages * room && tints_.refine(of_tints / (kImages * room))) return StepOutcome::kRoundDone;
   // What is left of that is not theirs to lower.
-  const double room_beside = std::max(room - of_images, kLeastRoom * room);
+  const double room_beside = std::max(room - of_images - of_tints, kLeastRoom * room);
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   // Samples alone lowered nothing: what halves of the rays differ by after some bounces was taken for the links'.

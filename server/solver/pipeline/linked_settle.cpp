@@ -59,8 +59,37 @@ ShadedLight::Values LinkedSolver::smoothDirect(DirectSmoothing& smoothing, Direc
   return shaded_.empty() ? ShadedLight::Values{} : shaded_.factors(raw, halves);
 }
 
+/// What of the light over links comes through coloured glass. False: not yet, go on with the next slice.
+bool LinkedSolver::tintLinks() {
+  if (!tints_.isNeeded()) return true;
+  if (pass_ != Pass::kTints) {
+    std::vector<LightTints::Sender> senders;
+    tinted_.clear();
+    for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
+      const auto& shooter = system_.shooters()[n];
+      if (shooter.column[0].points() + shooter.column[1].points() <= 0.0) continue;
+      if (shooter.crowd != scene::kNone && !crowds_[shooter.crowd].lamps) continue;
+      tinted_.push_back(n);
+      senders.push_back(shooter.light != scene::kNone    ? LightTints::of(lights_[shooter.light])
+                        : shooter.source != scene::kNone ? LightTints::of(sources_[shooter.source])
+                        : shooter.crowd != scene::kNone
+                            ? LightTints::of(crowds_[shooter.crowd])
+                            : LightTints::of(sides_[shooter.place.side], shooter.place, leafRays()));
+    }
+    tints_.begin(std::move(senders), leafRays());
+    pass_ = Pass::kTints;
+  }
+  if (!tints_.advance(kSliceSeconds)) return false;
+  for (std::size_t i = 0; i < tinted_.size(); ++i) {
+    for (std::size_t half = 0; half < 2; ++half) system_.shooters()[tinted_[i]].tint[half] = tints_.tint(i, half);
+  }
+  tint_noise_ = system_.tintNoise();
+  return true;
+}
+
 /// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
 bool LinkedSolver::lightLeaves() {
+  if (pass_ != Pass::kRays && !tintLinks()) return false;
   if (pass_ != Pass::kRays) {
     expander_.forget();
     inBothHalves([&](std::size_t half) { system_.irradiance(half, over_links_[half]); });

@@ -34,6 +34,9 @@ SliceLength firstSlice(const scene::PatchScene& patches) {
   return {most, std::min(most, kFewestMeasurements)};
 }
 
+/// Of --link-memory a part like this may be taken by colours of light over links.
+constexpr std::size_t kTintMemory = 16;
+
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
@@ -55,6 +58,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       memory_(*patches_, sides_, settings.link_memory / 2),  // rays may take the other half
       unshot_(*patches_),
       planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
+      tints_(*patches_, sides_, settings.seed, settings.link_memory / kTintMemory),
       parts_{*patches_, sides_, lights_, shots_, settings_, system_, expander_, memory_, transport_},
       repair_(
           parts_, [this] { return leafRays(); }, firstSlice(*patches_)),
@@ -196,8 +200,8 @@ Result<StepOutcome> LinkedSolver::advance() {
     if (findsMoreDue()) return StepOutcome::kSlice;
     wave_.begin(plan());
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wave_.wanted().empty() && phase_ == Phase::kImprove &&
-        !gather_->isBehind())  // no sample that there is room for can lower the error
+    if (wave_.wanted().empty() && phase_ == Phase::kImprove && !gather_->isBehind() &&
+        !tints_.isBehind())  // no sample that there is room for can lower the error
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wave_.wanted().empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
@@ -219,6 +223,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
   if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
+  if (pass_ != Pass::kTints) tints_.giveUp();
   if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || assessing_ != Assessed::kNothing) return;
   if (wave_.endInHaste()) settling_ = wave_.isMeasured();
 }

@@ -17,6 +17,7 @@
 #include "server/solver/edits/change_reach.h"
 #include "server/solver/error/field_error.h"
 #include "server/solver/lamps/crowd.h"
+#include "server/solver/lamps/light_tints.h"
 #include "server/solver/links/link_memory.h"
 #include "server/solver/links/link_planner.h"
 #include "server/solver/links/link_system.h"
@@ -75,6 +76,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
   [[nodiscard]] bool showsMirrors() const override { return true; }
+  /// Some of its scene is coloured glass.
+  [[nodiscard]] bool hasTints() const { return tints_.isNeeded(); }
   [[nodiscard]] double spreadByMirrors() const override;
   [[nodiscard]] std::shared_ptr<const LeafRays> rays() override { return leafRays(); }
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
@@ -101,7 +104,7 @@ class LinkedSolver final : public Solver {
  private:
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
-  enum class Pass { kNone, kFirst, kSecond, kRays };
+  enum class Pass { kNone, kFirst, kSecond, kTints, kRays };
   /// What a solution over nothing but the links is for.
   enum class FromLinks { kNo, kAfterEdit, kToConfirm };
   /// What was reached and is being assessed, for which paths may have to be traced.
@@ -143,6 +146,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool choosesAfterEdit();
   [[nodiscard]] StepOutcome assessed();
   [[nodiscard]] bool mayGoWithout();
+  [[nodiscard]] bool tintLinks();
+  [[nodiscard]] bool lacksTint() const;
   [[nodiscard]] bool lightLeaves();
   /// Returns what ShadedLight is to make of the change.
   [[nodiscard]] ShadedLight::Values smoothDirect(DirectSmoothing& smoothing, DirectSmoothing::Halves& halves) const;
@@ -257,6 +262,10 @@ class LinkedSolver final : public Solver {
   LinkPlanner planner_;
   std::shared_ptr<const LeafRays> leaf_rays_;      // of rays and paths; null: not asked for yet
   std::shared_ptr<const SpecularLeaves> mirrors_;  // null: none
+  LightTints tints_;                               // of light over links
+  double tint_noise_ = 0.0;                        // LinkSystem::tintNoise(), of the light that there is
+  /// Shooters that these are of, ascending.
+  std::vector<std::uint32_t> tinted_;  // shooters that these are of
   ImagedLight::Lamps lamp_images_, source_images_;
   float least_imaged_ = 0.0F;           // emission of the former, at least
   std::unique_ptr<LeafGather> gather_;  // of reflected light; null: lights, and what is bright, are not measured

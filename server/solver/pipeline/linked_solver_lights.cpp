@@ -64,7 +64,9 @@ void LinkedSolver::addCrowd(const Crowd& crowd) {
     const auto old = std::ranges::find_if(crowds_, &Crowd::isDark);
     const auto index = static_cast<std::uint32_t>(old - crowds_.begin());
     const auto shooter = std::ranges::find(shooters, index, &Shooter::crowd);
-    system_.forget(static_cast<std::uint32_t>(shooter - shooters.begin()));
+    const auto number = static_cast<std::uint32_t>(shooter - shooters.begin());
+    system_.forget(number);
+    std::erase(tinted_, number);
     shooter->area = crowd.area;
     *old = crowd;
     return;
@@ -125,6 +127,7 @@ void LinkedSolver::addSource(const PunctualLights::Source& source) {
       auto& shooter = system_.shooters()[n];
       if (shooter.source != static_cast<std::uint32_t>(old - sources_.begin())) continue;
       system_.forget(n);
+      std::erase(tinted_, n);
       shooter.area = source.flux_per_intensity;
     }
     *old = source;
@@ -139,11 +142,22 @@ void LinkedSolver::addSource(const PunctualLights::Source& source) {
   (void)system_.add(shooter);
 }
 
-/// Unknown while links of a light are still to be measured, or measured again.
+/// Whether a light has links of whose colour nothing is known: it came, or the solver was restored, since light was
+/// last solved for.
+bool LinkedSolver::lacksTint() const {
+  if (!tints_.isNeeded()) return false;
+  const auto& shooters = system_.shooters();
+  for (std::uint32_t n = 0; n < shooters.size(); ++n)
+    if (shooters[n].isLight() && shooters[n].power() > 0.0 && !std::ranges::binary_search(tinted_, n)) return true;
+  return false;
+}
+
+/// Unknown while links of a light are still to be measured, or measured again, or coloured.
 std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
   const auto& shooters = system_.shooters();
   if (!repair_.knowsLights()) return {};
   if (std::ranges::any_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) return {};
+  if (lacksTint()) return {};
   std::array<std::vector<glm::vec3>, 2> halves;
   inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
   DirectSmoothing smoothing;

@@ -17,6 +17,8 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   // What chance let through before an edit of geometry it may not let through again.
   auto* linked_before = former != nullptr && !see_through ? dynamic_cast<LinkedSolver*>(&former->solver) : nullptr;
+  // Rays that went through coloured glass know which leaves of it, and there is none any more.
+  if (linked_before != nullptr && linked_before->hasTints()) linked_before = nullptr;
   std::unique_ptr<LinkedSolver> linked;
   if (linked_before != nullptr) {
     linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources, *linked_before,

@@ -141,7 +141,11 @@ void ShadedLight::addLinks(const ShootersAndLights& from, LinkSystem::From which
         std::array<ShadedPlace, LeafShading::kMostPlaces> places;
         const auto count = shading_.places(side, leaf, places);
         const auto more = static_cast<float>(shadedPart(emitter, std::span(places).first(count)) - 1.0);
-        for (std::size_t half = 0; half < 2; ++half) values[half][number] += more * link[half][leaf] * sent[half];
+        for (std::size_t half = 0; half < 2; ++half) {
+          const auto& tint = shooter->tint[half];
+          const auto arrives = more * link[half][leaf] * sent[half];
+          values[half][number] += tint ? tint->at(side.first_value + leaf) * arrives : arrives;
+        }
       }
     }
   };

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/packing.hpp>
+#include <glm/vec4.hpp>
 #include <numbers>
 
 #include "common/parallel.h"
@@ -19,6 +21,10 @@ constexpr std::size_t kLeavesAPart = 64;
 constexpr double kSettled = 1e-5;
 constexpr int kMostSweeps = 1000;
 
+/// A colour of channels up to 1, in steps of 1/1023.
+std::uint32_t packed(const glm::dvec3& colour) { return glm::packUnorm3x10_1x2(glm::vec4(colour, 0.0F)); }
+glm::vec3 unpacked(std::uint32_t bits) { return glm::vec3(glm::unpackUnorm3x10_1x2(bits)); }
+
 /// One of the two halves.
 class Half {
  public:
@@ -30,6 +36,7 @@ class Half {
         from_sky_(count_, glm::vec3(0.0F)),
         irradiance_(count_, glm::vec3(0.0F)) {
     ends_.assign(count_ * rays_, LeafRays::kNothing);
+    if (light_.rays().hasTints()) tints_.assign(ends_.size(), packed(glm::dvec3(1.0)));
     inParts([&](std::size_t value) { castRays(static_cast<std::uint32_t>(value), mixKeys(key, value)); });
   }
 
@@ -67,9 +74,12 @@ class Half {
       const auto draw = draws(k);
       const auto from = rays.placeOn(value, {draw.z, draw.w});
       LeafRays::Place end;
-      const auto seen = rays.see(from, cosineDirection(from.normal, draw.x, draw.y), mixKeys(key, k), end);
+      LeafRays::Panes panes;
+      const auto seen =
+          rays.see(from, cosineDirection(from.normal, draw.x, draw.y), mixKeys(key, k), end, nullptr, &panes);
+      if (panes.count > 0) tints_[std::size_t{value} * rays_ + k] = packed(panes.tint);
       if (LeafRays::isSky(seen))
-        sky += light_.skyAt(seen - LeafRays::kSky);
+        sky += panes.tint * light_.skyAt(seen - LeafRays::kSky);
       else
         ends_[std::size_t{value} * rays_ + k] = seen;
     }
@@ -80,7 +90,8 @@ class Half {
     glm::vec3 sum(0.0F);
     for (std::uint32_t k = 0; k < rays_; ++k) {
       const auto seen = ends_[value * rays_ + k];
-      if (seen != LeafRays::kNothing) sum += radiosity[seen];
+      if (seen != LeafRays::kNothing)
+        sum += tints_.empty() ? radiosity[seen] : unpacked(tints_[value * rays_ + k]) * radiosity[seen];
     }
     return sum / static_cast<float>(rays_);
   }
@@ -95,6 +106,8 @@ class Half {
   std::size_t count_;
   std::uint32_t rays_;
   std::vector<std::uint32_t> ends_;  ///< leaf values, kNothing where light comes from none
+  std::vector<std::uint32_t>
+      tints_;  ///< by ray: packed(), of coloured glass that it went through; empty: there is none
   std::vector<glm::vec3> from_sky_, irradiance_;
 };
 

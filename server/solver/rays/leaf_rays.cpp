@@ -192,6 +192,27 @@ double LeafRays::stoppedPart(const geometry::Hit& hit, const glm::dvec3& at, con
   return static_cast<double>(patches_.stoppedAt(hit.triangle, glm::vec2(texel), glm::vec3(direction)));
 }
 
+/// Takes from what is left what is stopped there.
+void LeafRays::passThrough(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction,
+                           Passage& passage) const {
+  passage.part *= 1.0 - stoppedPart(hit, at, direction);
+  const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
+  if (surface.first_tint == scene::kNone) return;
+  passage.tint *= glm::dvec3(patches_.tintAt(surface, glm::vec2(texelAt(patches_.triangles[hit.triangle], at))));
+}
+
+void LeafRays::addPane(const geometry::Hit& hit, const glm::dvec3& at, Panes& panes) const {
+  const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
+  if (surface.first_tint == scene::kNone) return;
+  const auto texel = texelAt(patches_.triangles[hit.triangle], at);
+  const auto cell = [](double place, std::uint32_t leaves) {
+    return static_cast<std::uint32_t>(std::clamp(place, 0.0, static_cast<double>(leaves - 1)));
+  };
+  const auto which = surface.first_tint + cell(texel.y, surface.height) * surface.width + cell(texel.x, surface.width);
+  panes.tint *= glm::dvec3(patches_.tintAt(surface, glm::vec2(texel)));
+  if (patches_.leaf_tints[which] != glm::vec3(1.0F) && panes.count < Panes::kMost) panes.which[panes.count++] = which;
+}
+
 std::uint32_t LeafRays::litSideOf(const geometry::Hit& hit) const {
   const auto surface = patches_.triangle_surface[hit.triangle];
   const auto met = side_of_[surface][hit.front ? 0 : 1];
@@ -208,7 +229,7 @@ void LeafRays::meetFirst(std::span<const Place> from, std::span<const glm::dvec3
 }
 
 std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
-                            const geometry::Hit* first) const {
+                            const geometry::Hit* first, Panes* panes) const {
   auto origin = lifted(from);
   std::array<std::uint32_t, kMostSheets> passed;
   std::array<float, kMostSheets> distance;
@@ -221,6 +242,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
     if (!hit.found()) return kSky + SkyCells::of(direction);
     const auto at = origin + static_cast<double>(hit.t) * direction;
     if (starts < kMostStarts && passes(hit, at, direction, key)) {
+      if (panes != nullptr) addPane(hit, at, *panes);
       passed[sheets] = hit.triangle;  // those that lie in the same place count, too
       distance[sheets++] = hit.t;
       if (sheets < kMostSheets) continue;
@@ -282,23 +304,23 @@ bool LeafRays::isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3&
          rays_.open({glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd)});
 }
 
-double LeafRays::openPart(const Place& from, const glm::dvec3& to) const {
-  if (patches_.opacity.empty()) return isOpen(from, to) ? 1.0 : 0.0;
+LeafRays::Passage LeafRays::passageTo(const Place& from, const glm::dvec3& to) const {
+  if (patches_.opacity.empty()) return {isOpen(from, to) ? 1.0 : 0.0};
   const glm::dvec3 origin = lifted(from), way = to - origin;
   const double length = glm::length(way);
-  if (length <= kNearEnd) return 0.0;
+  if (length <= kNearEnd) return {};
   const geometry::Ray ray{glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd),
                           from.triangle};
   std::array<std::uint32_t, kMostSheets> passed;
-  double part = 1.0;
+  Passage passage{1.0};
   for (std::size_t sheets = 0; sheets < kMostSheets; ++sheets) {
     const auto hit = rays_.nearest(ray, std::span(passed).first(sheets));
-    if (!hit.found()) return part;
-    part *= 1.0 - stoppedPart(hit, origin + static_cast<double>(hit.t) * way / length, way);
-    if (part <= 0.0) return 0.0;
+    if (!hit.found()) return passage;
+    passThrough(hit, origin + static_cast<double>(hit.t) * way / length, way, passage);
+    if (passage.part <= 0.0) return {};
     passed[sheets] = hit.triangle;
   }
-  return 0.0;
+  return {};
 }
 
 LeafRays::Arrival LeafRays::arriveAt(const Place& from, const glm::dvec3& at) const {
@@ -309,32 +331,32 @@ LeafRays::Arrival LeafRays::arriveAt(const Place& from, const glm::dvec3& at) co
   const geometry::Ray ray{glm::vec3(origin), glm::vec3(direction), static_cast<float>(length + kNearPlane),
                           from.triangle};
   std::array<std::uint32_t, kMostSheets> passed;
-  double part = 1.0;
+  Passage passage{1.0};
   Arrival beneath;
   for (std::size_t sheets = 0; sheets < kMostSheets; ++sheets) {
     const auto hit = rays_.nearest(ray, std::span(passed).first(sheets));
     const double before = length - static_cast<double>(hit.t);
     if (!hit.found() || before < -kNearPlane) break;
     const auto there = origin + static_cast<double>(hit.t) * direction;
-    const double stopped = stoppedPart(hit, there, direction);
     passed[sheets] = hit.triangle;
     const auto& frame = patches_.triangles[hit.triangle];
     const bool is_in_plane = std::abs(glm::dot(glm::dvec3(frame.normal), there - at)) <= kNearEnd;
     if (!is_in_plane || before > kNearPlane) {
       if (before < kNearEnd) break;
-      part *= 1.0 - stopped;
-      if (part <= 0.0) return {};
+      passThrough(hit, there, direction, passage);
+      if (passage.part <= 0.0) return {};
       continue;
     }
     const auto texel = texelAt(frame, there);
     const glm::dvec3 normal(hit.front ? frame.normal : -frame.normal);
-    Arrival arrival{part * stopped, {positionAt(frame, texel), normal, kNothing, hit.triangle}};
+    Arrival arrival{passage, {positionAt(frame, texel), normal, kNothing, hit.triangle}};
+    arrival.passage.part *= stoppedPart(hit, there, direction);
     const auto s = litSideOf(hit);
     if (s == scene::kNone) return arrival;
     const auto value = leafAt(sides_[s], texel);
     arrival.end.value = standInOf(value);
     if (!isBeneath(sides_[s], value)) return arrival;
-    if (!(beneath.part > 0.0)) beneath = arrival;  // what covers it is met as well, if something does there
+    if (!(beneath.passage.part > 0.0)) beneath = arrival;  // what covers it is met as well, if something does there
   }
   return beneath;
 }

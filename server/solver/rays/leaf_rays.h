@@ -52,6 +52,18 @@ class LeafRays {
   [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
   /// Where in its chart a place lies that knows its triangle.
   [[nodiscard]] glm::dvec2 texelOf(const Place& place) const;
+  /// Coloured glass that a ray went through, and what is left of light, by channel, that went through it by chance.
+  struct Panes {
+    static constexpr std::size_t kMost = 16;
+    glm::dvec3 tint{1.0};  ///< of all of it, as it is at the places
+    std::array<std::uint32_t, kMost>
+        which;  ///< by index into PatchScene::leaf_tints, in the order of the ray; the first
+    std::size_t count = 0;
+  };
+  /// One can see through nothing.
+  [[nodiscard]] bool isOpaque() const { return patches_.opacity.empty(); }
+  [[nodiscard]] bool hasTints() const { return !patches_.tints.empty(); }
+  [[nodiscard]] const glm::vec3& tint(std::uint32_t which) const { return patches_.leaf_tints[which]; }
   /// What lies that way within `reach` (unit box), in single precision; `value` is kNothing where nothing does, and
   /// where it is no leaf.
   struct Sight {
@@ -66,9 +78,9 @@ class LeafRays {
   /// the ray or not, by chance from `key`.
   /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side, of
   /// `end.triangle`. As it was where it ends in the sky.
-  /// `first`: what the ray meets, of meetFirst(); null: that is looked for.
+  /// `first`: what the ray meets, of meetFirst(); null: that is looked for. `panes`: what it goes through is added.
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
-                                  const geometry::Hit* first = nullptr) const;
+                                  const geometry::Hit* first = nullptr, Panes* panes = nullptr) const;
   /// What rays of see() meet first, geometry::kPacket of them at most: asked together they cost half.
   void meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
                  std::span<geometry::Hit> hits) const;
@@ -81,12 +93,19 @@ class LeafRays {
   /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`. `normal`: of the face on
   /// which that lies, which a way that grazes it must not meet before; zero: it lies on none.
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3& normal = glm::dvec3(0.0)) const;
-  /// The same where one can see through what lies between: part of the light that passes. `normal` is none.
-  [[nodiscard]] double openPart(const Place& from, const glm::dvec3& to) const;
+  /// Part of the light that passes what lies on a way, of the channel that does best, and what of that the others do.
+  struct Passage {
+    double part = 0.0;
+    glm::dvec3 tint{1.0};
+
+    [[nodiscard]] glm::dvec3 light() const { return part * tint; }
+  };
+  /// isOpen() where one can see through what lies between. `normal` is none.
+  [[nodiscard]] Passage passageTo(const Place& from, const glm::dvec3& to) const;
   /// What is seen of a surface at a point that lies on it.
   struct Arrival {
-    double part = 0.0;  ///< of the light, that passes what lies before and is stopped there; 0: all is hidden
-    Place end;          ///< `value`: who stands for the leaf there, or kNothing where the surface is unlit
+    Passage passage;  ///< of the light, that passes what lies before and is stopped there; 0: all is hidden
+    Place end;        ///< `value`: who stands for the leaf there, or kNothing where the surface is unlit
   };
   [[nodiscard]] Arrival arriveAt(const Place& from, const glm::dvec3& at) const;
   /// Where ways from a place begin: a little before it.
@@ -114,6 +133,8 @@ class LeafRays {
   [[nodiscard]] bool passes(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction,
                             std::uint64_t key) const;
   [[nodiscard]] double stoppedPart(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction) const;
+  void passThrough(const geometry::Hit& hit, const glm::dvec3& at, const glm::dvec3& direction, Passage& passage) const;
+  void addPane(const geometry::Hit& hit, const glm::dvec3& at, Panes& panes) const;
   /// Number of the side that is lit where a ray meets it, or that stands for it; kNone: it is unlit.
   [[nodiscard]] std::uint32_t litSideOf(const geometry::Hit& hit) const;
   /// The leaf of a side that a texel lies on, or the nearest, by value.

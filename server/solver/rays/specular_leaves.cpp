@@ -17,11 +17,14 @@ std::uint64_t bitsOf(float x) { return std::bit_cast<std::uint32_t>(x); }
 std::shared_ptr<const SpecularLeaves> SpecularLeaves::find(const std::vector<Side>& sides,
                                                            const scene::PatchMaterials& materials,
                                                            const std::vector<scene::Surface>& surfaces) {
-  if (materials.specular.sideCount() == 0) return nullptr;
   std::shared_ptr<SpecularLeaves> found;
   std::size_t leaves = 0;
   for (const auto& side : sides) leaves += side.leaf_count;
+  // Rays that go through coloured glass are followed as those are that mirrors reflect.
+  if (std::ranges::any_of(surfaces, [](const auto& surface) { return surface.first_tint != scene::kNone; }))
+    found.reset(new SpecularLeaves(leaves));
   for (const auto& side : sides) {
+    if (materials.specular.sideCount() == 0) break;
     const auto colours = materials.specular.side(side.number), lobe = materials.lobe.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (!reflects(colours[leaf])) {

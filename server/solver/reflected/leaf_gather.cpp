@@ -112,7 +112,9 @@ void LeafGather::reflectBy(std::shared_ptr<const SpecularLeaves> mirrors) {
 }
 
 /// Of the light that steps bring, and of what is found for each while mirrors are weighed.
-std::size_t LeafGather::stepBytes() const { return (has_mirrors_ ? 3 : 1) * sizeof(Light32); }
+std::size_t LeafGather::stepBytes() const {
+  return (sights_.rays()->hasTints() ? 4 : has_mirrors_ ? 3 : 1) * sizeof(Light32);
+}
 
 std::size_t LeafGather::leastBytes(std::size_t leaves, bool has_mirrors) {
   const auto lights = kLights + (has_mirrors ? kMirrorLights : 0);
@@ -287,8 +289,7 @@ void LeafGather::average(std::size_t half) {
   averageSeen(sights_, half, halves_[half].radiosity.data(), halves_[half].arriving.data());
 }
 
-/// Where rays go on: what the leaf there has but for what comes by rays, and what the ray finds of that. `source`: null
-/// for none.
+/// Where rays go on: what the leaf there has but for what rays bring, and what the ray finds. `source`: null for none.
 void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source) {
   if (light_.mirrors) return followMirrors(half, source);
   auto& radiosity = halves_[half].radiosity;
@@ -419,7 +420,7 @@ glm::dvec3 LeafGather::doubtOf(std::size_t half, std::uint32_t end) const {
   while (end >= sights_.endCount()) {
     const auto& step = sights_.steps(half)[end - sights_.endCount()];
     end = step.next;
-    if (SpecularStep::is(step.by)) {
+    if (SpecularStep::is(step.by) || PaneStep::is(step.by)) {
       const auto tint = tintOf(step);
       part *= glm::dvec3(tint[0], tint[1], tint[2]);
       continue;

@@ -195,9 +195,10 @@ class LeafGather {
     std::vector<Light32> passed;     ///< tau x of the other side, by leaf; empty: nothing is translucent
     /// By leaf: what its rays bring from the sky where its cells are told apart or mirrors show it; empty: they do not.
     std::vector<Light32> sky;
-    std::vector<Light32> mirrored;  ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
-    std::vector<float> at_glass;    ///< by leaf: the part of its rays that meet glass first; empty: none does
-    std::vector<Light32> shot;      ///< by leaf, what only those in mirrors see: lamps, and what shooters send
+    std::vector<Light32> mirrored;     ///< by leaf: on how many leaves in mirrors its light arrives; empty: in none
+    std::vector<float> at_glass;       ///< by leaf: the part of its rays that meet glass first; empty: none does
+    std::vector<float> through_panes;  ///< by leaf: the part that goes through coloured glass first; empty likewise
+    std::vector<Light32> shot;         ///< by leaf, what only those in mirrors see: lamps, and what shooters send
     /// By leaf: what of that arrives by rays; and what arrives of images. Empty: nothing.
     std::vector<Light32> in_mirrors;
     std::vector<glm::vec3> imaged;
@@ -231,17 +232,29 @@ class LeafGather {
   void followMirrors(std::size_t half, const std::vector<Light>* source);
   [[nodiscard]] Light32 tintOf(const LeafSights::Step& step) const;
   [[nodiscard]] Light32 shotAt(std::size_t half, std::uint32_t end) const;
+  /// Ways that light takes by mirrors and panes: those that no mirror reflects, too, or not.
+  enum class Ways { kAll, kMirrors };
   template <typename Met>
-  [[nodiscard]] std::vector<Light32> reflectedOf(std::size_t half, const Met& met) const;
+  [[nodiscard]] std::vector<Light32> reflectedOf(std::size_t half, Ways ways, const Met& met) const;
+  struct Reflected {
+    std::vector<Light32> all, of_mirrors;  ///< the latter empty where there are no panes
+    [[nodiscard]] const std::vector<Light32>& byMirrors() const { return of_mirrors.empty() ? all : of_mirrors; }
+  };
+  template <typename Met>
+  [[nodiscard]] Reflected reflectedBoth(std::size_t half, const Met& met) const;
+  [[nodiscard]] Light32 throughPanes(std::size_t half, std::uint32_t end) const;
   void takeMirrors(std::size_t half);
   [[nodiscard]] bool takesLight(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] bool isImaged(const LeafSights::Step& step) const;
   [[nodiscard]] Light32 imagedIn(std::size_t half, const LeafSights::Step& step) const;
-  [[nodiscard]] Light32 arrivesAsImage(std::size_t half, std::uint32_t lamp, const LeafSights::Step& step) const;
+  [[nodiscard]] Light32 arrivesAsImage(std::size_t half, std::uint32_t lamp, std::uint32_t end) const;
   [[nodiscard]] Light32 imagedAt(std::size_t half, std::uint32_t end) const;
   void takeImages();
   void spreadImages();
   void tellImages();
+  [[nodiscard]] double partThroughPanes(std::size_t half, std::size_t value) const {
+    return halves_[half].through_panes.empty() ? 0.0 : static_cast<double>(halves_[half].through_panes[value]);
+  }
   [[nodiscard]] double atGlass(std::size_t half, std::size_t value) const {
     return halves_[half].at_glass.empty() ? 0.0 : static_cast<double>(halves_[half].at_glass[value]);
   }

@@ -54,7 +54,6 @@ void LeafGather::joinParts() {
 
 void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
   lost_[half] = LostRays(sights_.leafCount());
-  const auto steps = sights_.steps(half);
   std::vector<std::uint32_t> joined(sides_.size(), scene::kNone);  // by side: the last that it was joined to
   const auto leaves = sights_.leafCount();
   std::size_t first = 0;
@@ -72,7 +71,7 @@ void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
         if (end < leaves) {  // most
           join(sights_.sideOf(end));
         } else if (end >= sights_.endCount()) {
-          join(sights_.sideOf(LeafSights::leafOf(steps[end - sights_.endCount()])));
+          if (const auto seen = sights_.firstEnd(half, end); seen < leaves) join(sights_.sideOf(seen));
           joinSteps(half, end, parts);
         } else {
           if (sights_.isAbsorbed(end)) {
@@ -91,10 +90,10 @@ void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
 /// Where a ray goes on, and on.
 void LeafGather::joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts) const {
   const auto steps = sights_.steps(half);
-  while (end >= sights_.endCount()) {
+  for (end = sights_.behindPanes(half, end); end >= sights_.endCount();) {
     const auto& step = steps[end - sights_.endCount()];
-    end = step.next;
-    const auto next = end < sights_.endCount() ? end : LeafSights::leafOf(steps[end - sights_.endCount()]);
+    end = sights_.behindPanes(half, step.next);
+    const auto next = sights_.firstEnd(half, end);
     if (next < sights_.leafCount()) parts.join(sights_.sideOf(LeafSights::leafOf(step)), sights_.sideOf(next));
   }
 }
@@ -119,7 +118,8 @@ inline __attribute__((always_inline)) LeafGather::Light LeafGather::skyAt(std::s
   return light;
 }
 
-/// Calls visit() with each ray that ends on such a leaf.
+/// Calls visit() with each ray that ends on such a leaf. Those that come through coloured glass are left aside, and so
+/// is what leaves send there.
 template <typename Visit>
 void LeafGather::visitParted(std::size_t h, std::span<const std::uint32_t> leaves, const Visit& visit) const {
   if (leaves.empty()) return;
@@ -127,7 +127,7 @@ void LeafGather::visitParted(std::size_t h, std::span<const std::uint32_t> leave
   std::vector<bool> is_parted(sights_.endCount() + steps.size());  // by end of a ray
   for (const auto v : leaves) is_parted[v] = true;
   for (std::size_t i = 0; i < steps.size(); ++i)
-    is_parted[sights_.endCount() + i] = is_parted[LeafSights::leafOf(steps[i])];
+    is_parted[sights_.endCount() + i] = !PaneStep::is(steps[i].by) && is_parted[LeafSights::leafOf(steps[i])];
   for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
     for (const auto end : sights_.seen(h, v))
       if (is_parted[end]) visit(Arrival{v, end});
@@ -141,6 +141,10 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
   for (; end >= sights_.endCount(); end = sights_.steps(h)[end - sights_.endCount()].next) {
     const auto& step = sights_.steps(h)[end - sights_.endCount()];
     if (SpecularStep::is(step.by)) break;
+    if (PaneStep::is(step.by)) {
+      for (std::size_t c = 0; c < 3; ++c) part[c] *= static_cast<double>(sights_.tintOf(step)[static_cast<int>(c)]);
+      continue;
+    }
     const auto by = step.by;
     const auto reflectance = lightOf(light_.reflectance[by]);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -160,8 +164,7 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
 }
 
 void LeafGather::addArrival(std::size_t h, const Arrival& ray, std::span<PartedFlux> fluxes) const {
-  const auto by =
-      ray.end < sights_.endCount() ? ray.end : LeafSights::leafOf(sights_.steps(h)[ray.end - sights_.endCount()]);
+  const auto by = sights_.firstEnd(h, ray.end);
   const double share = areaOf(ray.value) / sights_.counts()[ray.value];
   auto& arrives = fluxes[part_[sights_.sideOf(by)]].arrives;
   const auto sent = sentFrom(h, ray.end);
@@ -183,8 +186,9 @@ void LeafGather::weighPartedLoss(std::size_t h) {
   for (const auto v : leaves) {
     auto& flux = fluxes[part_[sights_.sideOf(v)]];
     const auto sent = sentFrom(h, v);
+    const double beside_panes = 1.0 - partThroughPanes(h, v);
     for (std::size_t c = 0; c < 3; ++c) {
-      flux.sent[c] += areaOf(v) * sent[c];
+      flux.sent[c] += areaOf(v) * beside_panes * sent[c];
       flux.even[c] += areaOf(v) * sent[c] * lostOf(h, v).all();
     }
   }
@@ -285,8 +289,10 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
 /// Whether a ray ends where there is light, or may be, or passes such.
 bool LeafGather::endsInLight(std::size_t half, std::uint32_t end, const std::vector<bool>& lit) const {
   const auto steps = sights_.steps(half);
-  for (; end >= sights_.endCount(); end = steps[end - sights_.endCount()].next)
-    if (lit[sights_.sideOf(LeafSights::leafOf(steps[end - sights_.endCount()]))]) return true;
+  for (; end >= sights_.endCount(); end = steps[end - sights_.endCount()].next) {
+    const auto& step = steps[end - sights_.endCount()];
+    if (!PaneStep::is(step.by) && lit[sights_.sideOf(LeafSights::leafOf(step))]) return true;
+  }
   if (end < sights_.leafCount()) return lit[sights_.sideOf(end)];
   return !sights_.isAbsorbed(end) && halves_[half].source[end] != Light{};
 }

@@ -1,4 +1,5 @@
-// LeafGather and mirrors: what rays see in them, and what of the light of leaves arrives by way of them.
+// LeafGather, mirrors and coloured glass: what rays see in and through them, and what of the light of leaves arrives by
+// way of them.
 #include <glm/geometric.hpp>
 #include <utility>
 
@@ -26,41 +27,79 @@ void inLeavesOf(const LeafSights& sights, std::size_t half, const Visit& visit) 
 
 }  // namespace
 
-/// What the mirror of a step reflects.
+/// What the mirror of a step reflects, or its pane lets pass.
 LeafGather::Light32 LeafGather::tintOf(const LeafSights::Step& step) const {
   const auto mirror = SpecularStep::of(step.by);
-  const auto tint = light_.mirrors->reflectance(mirror.leaf, mirror.edge());
+  const auto tint =
+      PaneStep::is(step.by) ? sights_.tintOf(step) : light_.mirrors->reflectance(mirror.leaf, mirror.edge());
   return {tint.x, tint.y, tint.z, 0.0F};
+}
+
+/// What all panes let pass that a ray goes through from there on.
+LeafGather::Light32 LeafGather::throughPanes(std::size_t half, std::uint32_t end) const {
+  auto part = kWhite;
+  for (; end >= sights_.endCount(); end = sights_.steps(half)[end - sights_.endCount()].next) {
+    const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    if (!PaneStep::is(step.by)) break;
+    const auto tint = tintOf(step);
+    for (std::size_t c = 0; c < 3; ++c) part[c] *= tint[c];
+  }
+  return part;
 }
 
 /// What the leaf there has that only those see who see it in a mirror.
 LeafGather::Light32 LeafGather::shotAt(std::size_t half, std::uint32_t end) const {
-  if (end >= sights_.endCount()) {
-    const auto& step = sights_.steps(half)[end - sights_.endCount()];
+  const auto behind = sights_.behindPanes(half, end);
+  if (behind >= sights_.endCount()) {
+    const auto& step = sights_.steps(half)[behind - sights_.endCount()];
     if (SpecularStep::is(step.by) && SpecularStep::of(step.by).is_again) return {};
-    end = LeafSights::leafOf(step);
   }
-  return end < sights_.leafCount() ? halves_[half].shot[end] : Light32{};
+  const auto leaf = sights_.firstEnd(half, behind);
+  if (leaf >= sights_.leafCount()) return {};
+  auto shot = halves_[half].shot[leaf];
+  if (behind != end) {
+    const auto part = throughPanes(half, end);
+    for (std::size_t c = 0; c < 3; ++c) shot[c] *= part[c];
+  }
+  return shot;
 }
 
-/// By step of a mirror: what it reflects of what is met there, and of what the mirrors beyond reflect. `met(end)`: of
-/// where the ray ends, or goes on.
+/// By step of a mirror or pane: what it reflects, or lets pass, of what is met there, and of what those beyond do.
+/// `met(end)`: of where the ray ends, or goes on. Of rays that come straight through panes kMirrors alone leaves out
+/// what no mirror reflected.
 template <typename Met>
-std::vector<LeafGather::Light32> LeafGather::reflectedOf(std::size_t half, const Met& met) const {
+std::vector<LeafGather::Light32> LeafGather::reflectedOf(std::size_t half, Ways ways, const Met& met) const {
   const auto ends = sights_.endCount();
   const auto steps = sights_.steps(half);
   std::vector<Light32> reflected(steps.size());
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const auto& step = steps[i];
-    if (!SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
-    const Light32 here = met(step.next), beyond = step.next >= ends ? reflected[step.next - ends] : Light32{};
+    const bool is_pane = PaneStep::is(step.by);
+    if (!is_pane && !SpecularStep::is(step.by)) continue;  // what a leaf reflects diffusely is its own light
+    const Light32 beyond = step.next >= ends ? reflected[step.next - ends] : Light32{};
+    Light32 here{};
+    if (!is_pane && ways == Ways::kMirrors && step.next >= ends && PaneStep::is(steps[step.next - ends].by)) {
+      here = met(sights_.behindPanes(half, step.next));
+      const auto part = throughPanes(half, step.next);
+      for (std::size_t c = 0; c < 3; ++c) here[c] *= part[c];
+    } else if (!is_pane || ways == Ways::kAll) {
+      here = met(step.next);
+    }
     const auto tint = tintOf(step);
     for (std::size_t c = 0; c < 3; ++c) reflected[i][c] = tint[c] * (here[c] + beyond[c]);
   }
   return reflected;
 }
 
-/// followSteps() where some steps are of mirrors.
+/// What lamps send straight through panes comes over links, and is not to be counted twice.
+template <typename Met>
+LeafGather::Reflected LeafGather::reflectedBoth(std::size_t half, const Met& met) const {
+  Reflected reflected{reflectedOf(half, Ways::kAll, met), {}};
+  if (sights_.rays()->hasTints()) reflected.of_mirrors = reflectedOf(half, Ways::kMirrors, met);
+  return reflected;
+}
+
+/// followSteps() where some steps are of mirrors, or of panes.
 void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* source) {
   auto& radiosity = halves_[half].radiosity;
   const auto& passed = halves_[half].passed;
@@ -68,6 +107,11 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
   for (const auto& step : sights_.steps(half)) {
     auto& light = *to++;
     const auto& next = radiosity[step.next];
+    if (PaneStep::is(step.by)) {
+      const auto tint = tintOf(step);
+      for (std::size_t c = 0; c < 3; ++c) light[c] = tint[c] * next[c];
+      continue;
+    }
     if (!SpecularStep::is(step.by)) {
       const auto& reflectance = light_.reflectance[step.by];
       for (std::size_t c = 0; c < 3; ++c) {
@@ -101,30 +145,39 @@ bool LeafGather::isImaged(const LeafSights::Step& step) const {
 /// Of a step: light of a lamp that the ray found in a mirror and that leaves get as an image, without the ray.
 LeafGather::Light32 LeafGather::imagedIn(std::size_t half, const LeafSights::Step& step) const {
   if (!isImaged(step)) return {};
-  auto end = step.next;
-  if (end >= sights_.endCount()) {  // rays go on from lamps of metal, too
-    const auto& next = sights_.steps(half)[end - sights_.endCount()];
+  const auto behind = sights_.behindPanes(half, step.next);
+  if (behind >= sights_.endCount()) {  // rays go on from lamps of metal, too
+    const auto& next = sights_.steps(half)[behind - sights_.endCount()];
     if (SpecularStep::is(next.by) && SpecularStep::of(next.by).is_again) return {};
-    end = LeafSights::leafOf(next);
   }
+  const auto end = sights_.firstEnd(half, behind);
   if (end >= sights_.leafCount()) return {};
-  const auto tint = tintOf(step);
+  const auto tint = tintOf(step), part = throughPanes(half, step.next);
   const auto& lamp = light_.imaged_lamps[end];
-  return {tint[0] * lamp.x, tint[1] * lamp.y, tint[2] * lamp.z, 0.0F};
+  return {tint[0] * part[0] * lamp.x, tint[1] * part[1] * lamp.y, tint[2] * part[2] * lamp.z, 0.0F};
 }
 
-/// Of the first step of a ray that is drawn as a lamp's light leaves it: what of that arrives next, as of an image.
-LeafGather::Light32 LeafGather::arrivesAsImage(std::size_t half, std::uint32_t lamp,
-                                               const LeafSights::Step& step) const {
-  if (!isImaged(step) || !takesLight(half, step.next)) return {};
-  const auto tint = tintOf(step);
+/// Of a ray that is drawn as a lamp's light leaves it: what of that arrives as of an image.
+LeafGather::Light32 LeafGather::arrivesAsImage(std::size_t half, std::uint32_t lamp, std::uint32_t end) const {
+  const auto first = sights_.behindPanes(half, end);
+  if (first < sights_.endCount()) return {};
+  const auto& step = sights_.steps(half)[first - sights_.endCount()];
+  if (!isImaged(step) || !takesLight(half, sights_.behindPanes(half, step.next))) return {};
+  const auto tint = tintOf(step), before = throughPanes(half, end), after = throughPanes(half, step.next);
   const auto& light = light_.imaged_lamps[lamp];
-  return {tint[0] * light.x, tint[1] * light.y, tint[2] * light.z, 0.0F};
+  Light32 arrives{light.x, light.y, light.z, 0.0F};
+  for (std::size_t c = 0; c < 3; ++c) arrives[c] *= before[c] * tint[c] * after[c];
+  return arrives;
 }
 
 /// What imagedIn() tells of where a ray ends, or goes on: who sees that in another mirror gets no image of it.
 LeafGather::Light32 LeafGather::imagedAt(std::size_t half, std::uint32_t end) const {
-  return end >= sights_.endCount() ? imagedIn(half, sights_.steps(half)[end - sights_.endCount()]) : Light32{};
+  const auto behind = sights_.behindPanes(half, end);
+  if (behind < sights_.endCount()) return {};
+  auto imaged = imagedIn(half, sights_.steps(half)[behind - sights_.endCount()]);
+  const auto part = throughPanes(half, end);
+  for (std::size_t c = 0; c < 3; ++c) imaged[c] *= part[c];
+  return imaged;
 }
 
 /// What arrives of images, which is like light over links from then on.
@@ -195,6 +248,7 @@ void LeafGather::tellImages() {
 bool LeafGather::takesLight(std::size_t half, std::uint32_t end) const {
   if (end >= sights_.endCount()) {
     const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    if (PaneStep::is(step.by)) return false;
     if (SpecularStep::is(step.by) && SpecularStep::of(step.by).is_again) return false;
     end = LeafSights::leafOf(step);
   }
@@ -209,6 +263,7 @@ void LeafGather::takeMirrors(std::size_t h) {
   half.in_mirrors.clear();
   half.shot.clear();
   half.at_glass.clear();
+  half.through_panes.clear();
   if (!light_.mirrors) return;
   const auto leaves = sights_.leafCount(), ends = sights_.endCount();
   half.shot.resize(leaves);
@@ -216,19 +271,21 @@ void LeafGather::takeMirrors(std::size_t h) {
     const auto shot = light_.lamps[v] + light_.shot[h][v];
     half.shot[v] = {shot.x, shot.y, shot.z, 0.0F};
   }
-  const auto arrives = reflectedOf(h, [&](std::uint32_t end) { return takesLight(h, end) ? kWhite : Light32{}; });
+  const auto arrives = reflectedBoth(h, [&](std::uint32_t end) { return takesLight(h, end) ? kWhite : Light32{}; });
   half.mirrored.resize(leaves);
   half.in_mirrors.resize(leaves);
-  if (light_.mirrors->hasGlass()) half.at_glass.resize(leaves);
+  if (light_.mirrors->hasGlass() || sights_.rays()->hasTints()) half.at_glass.resize(leaves);
+  if (sights_.rays()->hasTints()) half.through_panes.resize(leaves);
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
-    const auto first = end >= ends ? LeafSights::leafOf(sights_.steps(h)[end - ends]) : end;
-    if (first < leaves && light_.mirrors->isGlass(first)) half.at_glass[v] += part;
+    const bool is_pane = end >= ends && PaneStep::is(sights_.steps(h)[end - ends].by);
+    const auto first = sights_.firstEnd(h, end);
+    if (is_pane || (first < leaves && light_.mirrors->isGlass(first))) half.at_glass[v] += part;
+    if (is_pane) half.through_panes[v] += part;
     if (end < ends) return;
-    const auto imaged = arrivesAsImage(h, v, sights_.steps(h)[end - ends]);
+    const auto imaged = arrivesAsImage(h, v, end);
     for (std::size_t c = 0; c < 3; ++c) {
-      const float by_mirror = part * arrives[end - ends][c];
-      half.mirrored[v][c] += by_mirror;
-      half.in_mirrors[v][c] += by_mirror * half.shot[v][c] - part * imaged[c];
+      half.mirrored[v][c] += part * arrives.all[end - ends][c];
+      half.in_mirrors[v][c] += part * (arrives.byMirrors()[end - ends][c] * half.shot[v][c] - imaged[c]);
     }
   });
   takeMirroredSky(h);
@@ -243,7 +300,7 @@ void LeafGather::takeMirroredSky(std::size_t h) {
     for (std::size_t c = 0; c < 3 && sights_.isSky(end); ++c) sky[c] = static_cast<float>(half.source[end][c]);
     return sky;
   };
-  const auto reflected = reflectedOf(h, skyOf);
+  const auto reflected = reflectedOf(h, Ways::kAll, skyOf);
   half.sky.assign(sights_.leafCount(), {});
   inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
     const auto light = end >= ends ? reflected[end - ends] : skyOf(end);
@@ -271,20 +328,27 @@ void LeafGather::weighMirrors() {
         mirrored_flux_[c] += 0.5 * areaOf(v) * static_cast<double>(halves_[h].imaged[v][static_cast<int>(c)]);
     }
     const auto& radiosity = halves_[h].radiosity;
-    const auto to_sky = reflectedOf(h, [&](std::uint32_t end) { return sights_.isSky(end) ? kWhite : Light32{}; });
-    const auto unlit = reflectedOf(h, [&](std::uint32_t end) { return sights_.isAbsorbed(end) ? kWhite : Light32{}; });
+    const auto to_sky = reflectedBoth(h, [&](std::uint32_t end) { return sights_.isSky(end) ? kWhite : Light32{}; });
+    const auto unlit =
+        reflectedBoth(h, [&](std::uint32_t end) { return sights_.isAbsorbed(end) ? kWhite : Light32{}; });
     inLeavesOf(sights_, h, [&](std::uint32_t v, std::uint32_t end, float part) {
-      if (end < ends || !SpecularStep::is(sights_.steps(h)[end - ends].by)) return;
-      const auto by = LeafSights::leafOf(sights_.steps(h)[end - ends]);
+      if (end < ends) return;
+      const auto& step = sights_.steps(h)[end - ends];
+      const bool is_pane = PaneStep::is(step.by);
+      if (!is_pane && !SpecularStep::is(step.by)) return;
       const auto shot = shotOf(h, v);
       for (std::size_t c = 0; c < 3; ++c) {
         const double share = 0.5 * areaOf(v) * static_cast<double>(part);
-        const double sent = share * (static_cast<double>(radiosity[v][c]) + shot[c]);
-        const auto leaves = static_cast<double>(to_sky[end - ends][c]),
-                   dies = static_cast<double>(unlit[end - ends][c]);
-        escaped_[c] += sent * leaves;
-        absorbed_[c] += sent * dies;
-        mirrored_flux_[c] += sent * (leaves + dies) + share * static_cast<double>(radiosity[end][c] - radiosity[by][c]);
+        const double by_rays = share * static_cast<double>(radiosity[v][c]), over_links = share * shot[c];
+        const auto sent = [&](const Reflected& of) {
+          return by_rays * static_cast<double>(of.all[end - ends][c]) +
+                 over_links * static_cast<double>(of.byMirrors()[end - ends][c]);
+        };
+        const double leaves = sent(to_sky), dies = sent(unlit);
+        escaped_[c] += leaves;
+        absorbed_[c] += dies;
+        const float own = is_pane ? 0.0F : radiosity[LeafSights::leafOf(step)][c];
+        mirrored_flux_[c] += leaves + dies + share * static_cast<double>(radiosity[end][c] - own);
       }
     });
   }

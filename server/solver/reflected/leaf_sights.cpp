@@ -28,6 +28,8 @@ constexpr std::size_t kMostSteps = 32;
 constexpr std::size_t kFewSteps = 8;
 /// Of steps, so that no slice makes more than 32 bits number.
 constexpr std::size_t kMostNumbers = std::size_t{1} << 30;
+/// No other number of a ray's is drawn with this.
+constexpr std::uint64_t kAbsorbs = 0x50414e45ULL;
 
 }  // namespace
 
@@ -135,7 +137,13 @@ class LeafSights::Way {
       : sights_(sights), place_(place), direction_(direction), key_(key) {}
 
   void see(const geometry::Hit* first = nullptr) {
-    seen_ = sights_.rays_->see(place_, direction_, key_, there_, first);
+    if (!sights_.rays_->hasTints()) {
+      seen_ = sights_.rays_->see(place_, direction_, key_, there_, first);
+      return;
+    }
+    LeafRays::Panes panes;
+    seen_ = sights_.rays_->see(place_, direction_, key_, there_, first, &panes);
+    if (panes.count > 0) goThrough(panes);
   }
   [[nodiscard]] std::uint32_t seen() const { return seen_; }
   [[nodiscard]] const LeafRays::Place& there() const { return there_; }
@@ -165,6 +173,16 @@ class LeafSights::Way {
   }
 
  private:
+  /// Where there is no memory for steps the ray ends in the glass, by chance: as often as light does that is of all
+  /// channels alike.
+  void goThrough(const LeafRays::Panes& panes) {
+    for (std::size_t i = 0; sights_.goes_on_ && i < panes.count && count_ < kMostSteps; ++i)
+      by_[count_++] = PaneStep{panes.which[i]}.code();
+    if (sights_.goes_on_) return;
+    const auto& tint = panes.tint;
+    if (uniformFromKey(mixKeys(key_, kAbsorbs)) >= (tint.x + tint.y + tint.z) / 3.0) seen_ = LeafRays::kNothing;
+  }
+
   void scatter() {
     by_[count_++] = seen_;
     key_ = mixKeys(key_, count_);
@@ -412,8 +430,10 @@ std::size_t LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_
     bool passes = false;
     auto last = end;
     std::size_t count = 0;
-    for (; last >= endCount(); last = steps_[half][last - endCount()].next, ++count)
-      passes = passes || leaves[leafOf(steps_[half][last - endCount()])];
+    for (; last >= endCount(); last = steps_[half][last - endCount()].next, ++count) {
+      const auto& step = steps_[half][last - endCount()];
+      passes = passes || (!PaneStep::is(step.by) && leaves[leafOf(step)]);
+    }
     if (!passes && !leaves[last]) continue;
     seen.set(at, seen.most());
     steps += count;

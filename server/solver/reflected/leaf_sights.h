@@ -72,13 +72,27 @@ class LeafSights {
   [[nodiscard]] bool isMirror(std::uint32_t value) const {
     return mirrors_ && value < leaf_count_ && mirrors_->has(value);
   }
-  /// The ray reached a leaf that is parted, or a mirror, and what it saw from there. Later ones go on to earlier ones.
+  /// The ray reached a leaf that is parted, or a mirror, and what it saw from there, or what it saw through coloured
+  /// glass. Later ones go on to earlier ones.
   struct Step {
-    std::uint32_t by;    ///< leaf value, or what SpecularStep says
+    std::uint32_t by;    ///< leaf value, or what SpecularStep or PaneStep says
     std::uint32_t next;  ///< an end, or the step before
   };
   [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
-  /// The leaf of a step.
+  /// Where a ray ends, or what it reaches first of what it goes on from, panes left aside: a leaf, or another end.
+  [[nodiscard]] std::uint32_t firstEnd(std::size_t half, std::uint32_t end) const {
+    end = behindPanes(half, end);
+    return end < endCount() ? end : leafOf(steps_[half][end - endCount()]);
+  }
+  /// The end, or the step by a leaf, that a ray goes on to through coloured glass.
+  [[nodiscard]] std::uint32_t behindPanes(std::size_t half, std::uint32_t end) const {
+    while (end >= endCount() && PaneStep::is(steps_[half][end - endCount()].by))
+      end = steps_[half][end - endCount()].next;
+    return end;
+  }
+  /// Of light that goes through a pane.
+  [[nodiscard]] const glm::vec3& tintOf(const Step& pane) const { return rays_->tint(PaneStep::of(pane.by).tint); }
+  /// The leaf of a step that is no pane's.
   [[nodiscard]] static std::uint32_t leafOf(const Step& step) {
     return SpecularStep::is(step.by) ? SpecularStep::of(step.by).leaf : step.by;
   }

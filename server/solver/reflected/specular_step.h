@@ -1,5 +1,5 @@
-// What a step of a ray says that a mirror reflected (LeafSights::Step::by): which leaf, and how, in 32 bits. Colours
-// are not in it, so that an edit of them needs no new ray. Plain values.
+// What a step of a ray says that a mirror reflected, or that went through coloured glass (LeafSights::Step::by): which
+// leaf, and how, in 32 bits. Colours of mirrors are not in it, so that an edit of them needs no new ray. Plain values.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +32,17 @@ struct SpecularStep {
  private:
   static constexpr std::uint32_t kLevels = 16, kLevelShift = 26;
   static constexpr std::uint32_t kIsAgain = std::uint32_t{1} << 30, kIsSpecular = std::uint32_t{1} << 31;
+};
+
+struct PaneStep {
+  std::uint32_t tint = 0;  ///< into PatchScene::leaf_tints, below 2^30
+
+  [[nodiscard]] std::uint32_t code() const { return kIsPane | tint; }
+  [[nodiscard]] static bool is(std::uint32_t code) { return code >> 30U == 1U; }
+  [[nodiscard]] static PaneStep of(std::uint32_t code) { return {code & (kIsPane - 1)}; }
+
+ private:
+  static constexpr std::uint32_t kIsPane = std::uint32_t{1} << 30;
 };
 
 }  // namespace radiosity::solver

@@ -23,15 +23,14 @@ constexpr std::size_t kEachLamp = 32;
 constexpr std::uint32_t kDraws = 64;
 /// Points on a lamp that look first, and so many where these do not agree.
 constexpr std::uint32_t kFirstLooks = 8, kAllLooks = PlaceLight::kMostLooks;
-static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPacket == 0);
+static_assert(kFirstLooks % geometry::kPacket == 0 && kAllLooks % geometry::kPacket == 0 &&
+              kAllLooks <= TintedRays::kMostPoints);
 /// Where the first agree the others are asked with this chance.
 constexpr double kAskAgain = 0.25;
 /// Points of a lamp that is no surface.
 constexpr std::uint32_t kLampLooks = 32;
 /// Rays of a look at an image: to the mirror, and from there to the lamp.
 constexpr std::uint32_t kRaysOfLook = 2;
-/// Ways to a lamp end so far before it (unit box), well above the rounding of positions.
-constexpr double kLift = 2e-6;
 /// A ray goes on from so many leaves at most that something cuts.
 constexpr std::size_t kMostSteps = 8;
 /// Rays in all directions for each look at what is far brighter than the rest.
@@ -52,9 +51,9 @@ float strongest(const glm::vec3& colour) { return std::max({colour.x, colour.y, 
 PlaceLight::PlaceLight(const SolvedScene& solved)
     : patches_(solved.patches),
       sides_(std::make_shared<std::vector<Side>>(makeSides(patches_))),
-      rays_(solved.rays),
+      rays_(solved.rays ? solved.rays : std::make_shared<const LeafRays>(patches_, *sides_)),
+      tinted_(rays_),
       normals_(solved.normals) {
-  if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, *sides_);
   auto lamps = findLightPolygons(patches_, *sides_, solved.materials.emission);
   std::erase_if(lamps, [](const LightPolygon& lamp) { return lamp.emission == glm::vec3(0.0F); });
   if (lamps.size() <= kEachLamp) {
@@ -204,14 +203,16 @@ PlaceLight::Gathered PlaceLight::reflected(const Spot& spot, std::uint64_t key, 
       if (weight <= 0.0) continue;
       const auto of_ray = mixKeys(key, order[first + i].number);
       LeafRays::Place end;
-      const auto value = rays_->see(spot.place, direction[i], of_ray, end, &hit[i]);
+      glm::dvec3 tint(1.0);
+      const auto value = tinted_.see(spot.place, direction[i], of_ray, end, tint, &hit[i]);
       double share = weight / rays;
       if (bright_ && value == end.value && value < radiosity_.size() && bright_->density(value) > 0.0)
         share = counts.weight(cosine, glm::dot(spot.shading, direction[i]), -glm::dot(end.normal, direction[i]),
                               glm::distance(end.position, spot.place.position), bright_->density(value));
-      sum.light += share * (leaving(value, end, of_ray, kMostSteps) +
-                            alongMirrors({value, end, direction[i], of_ray, kMostSteps}));
-      if (!off_.empty() && value < off_.size()) sum.off += weight * glm::dvec3(off_[value]);
+      sum.light +=
+          share * tint *
+          (leaving(value, end, of_ray, kMostSteps) + alongMirrors({value, end, direction[i], of_ray, kMostSteps}));
+      if (!off_.empty() && value < off_.size()) sum.off += weight * tint * glm::dvec3(off_[value]);
     }
   }
   if (bright_) sum.light += fromBright(spot, mixKeys(key, kLookKey), counts);
@@ -233,14 +234,15 @@ glm::dvec3 PlaceLight::fromBright(const Spot& spot, std::uint64_t key, const Sam
                      std::span(hit).first(together));
     for (std::size_t i = 0; i < together; ++i) {
       LeafRays::Place end;
-      const auto value = rays_->see(spot.place, direction[i], of_look[i], end, &hit[i]);
+      glm::dvec3 tint(1.0);
+      const auto value = tinted_.see(spot.place, direction[i], of_look[i], end, tint, &hit[i]);
       const double leaves = -glm::dot(there[i].normal, direction[i]);
       // Rays start a little before their places, and may end beyond the edge of the leaf.
       if (value >= radiosity_.size() || rays_->sideOf(value).number != rays_->sideOf(there[i].value).number) continue;
       if (leaves * glm::distance(end.position, there[i].position) > kNearEnd) continue;
       sum += counts.weight(glm::dot(spot.place.normal, direction[i]), glm::dot(spot.shading, direction[i]), leaves,
                            glm::distance(there[i].position, spot.place.position), bright_->density(there[i].value)) *
-             glm::dvec3(radiosity_[there[i].value]);
+             tint * glm::dvec3(radiosity_[there[i].value]);
     }
     together = 0;
   };
@@ -264,8 +266,9 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
   const auto draw = sobol4(0, key);
   LeafRays::Place end;
   const auto direction = cosineDirection(spot.place.normal, draw.x, draw.y);
-  const auto value = rays_->see(spot.place, direction, key, end);
-  return leaving(value, end, key, steps) + alongMirrors({value, end, direction, key, steps});
+  glm::dvec3 tint(1.0);
+  const auto value = tinted_.see(spot.place, direction, key, end, tint);
+  return tint * (leaving(value, end, key, steps) + alongMirrors({value, end, direction, key, steps}));
 }
 
 /// What a ray that met a mirror sees in it, beside the light of the mirror's own leaf. Lamps count in full there, since
@@ -285,7 +288,7 @@ glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
       part *= glm::dvec3(mirrors_->reflectance(value, static_cast<float>(edge)));
     direction = reflection.direction;
     const auto from = end;
-    value = rays_->see(from, direction, key, end);
+    value = tinted_.see(from, direction, key, end, part);
     sum += part * leaving(value, end, key, met.steps);
     if (value >= lamp_emission_.size() || (is_imaged && channelSum(lamp_emission_[value]) > least_imaged_)) continue;
     sum += part * glm::dvec3(lamp_emission_[value]);
@@ -356,20 +359,22 @@ glm::dvec3 PlaceLight::fromSources(const Spot& spot, std::uint64_t key) const {
     auto shaded = place;
     shaded.normal = spot.shading;
     const auto look = lookAt(sources_[i], shaded, {});
-    if (look.brings > 0.0 && glm::dot(place.normal, look.way) > 0.0 &&
-        isOpen(place, place.position + look.way, glm::dvec3(0.0), mixKeys(key, ~i)))
-      sum += look.brings * sources_[i].intensity;
+    if (look.brings > 0.0 && glm::dot(place.normal, look.way) > 0.0)
+      sum += look.brings * tinted_.passageTo(place, place.position + look.way, glm::dvec3(0.0), mixKeys(key, ~i)) *
+             sources_[i].intensity;
   }
   return sum;
 }
 
 /// For an intensity of one, by some of its points.
-double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const {
+glm::dvec3 PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const {
   const auto& place = spot.place;
   const Sobol4 draws(key);
   const auto whole = static_cast<float>(wholeIrradiance(lamp, place.position, spot.shading));
   const std::uint32_t count = lamp.shape.kind == LampShape::Kind::kWeb ? 1 : kLampLooks;
   LampLooks looks;
+  double seen = 0.0;
+  glm::dvec3 light(0.0);
   for (std::uint32_t k = 0; k < count; ++k) {
     const auto draw = draws(k);
     const auto point = lampPoint(lamp, place.position, spot.shading, {draw.x, draw.y});
@@ -381,32 +386,40 @@ double PlaceLight::fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint6
     }
     looks.ask(all, brings);
     if (glm::dot(place.normal, point.position - place.position) <= 0.0) continue;  // the surface itself hides it
-    if (isOpen(place, point.position, glm::dvec3(0.0), mixKeys(key, k))) looks.see(all, brings);
+    const auto passes = tinted_.passageTo(place, point.position, glm::dvec3(0.0), mixKeys(key, k));
+    if (passes == glm::dvec3(0.0)) continue;
+    looks.see(all, brings);
+    seen += point.brings;
+    light += point.brings * passes;
   }
-  return static_cast<double>(looks.irradiance(count));
+  return seen > 0.0 ? static_cast<double>(looks.irradiance(count)) * (light / seen) : glm::dvec3(0.0);
 }
 
 /// For an emission of one: the exact form factor of all of it, times the part of that which is seen.
-double PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const {
+glm::dvec3 PlaceLight::fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const {
   const auto& place = spot.place;
-  if (unhiddenLight(lamp, place) <= 0.0) return 0.0;
+  if (unhiddenLight(lamp, place) <= 0.0) return glm::dvec3(0.0);
   const std::span corners(lamp.corners.data(), lamp.corner_count);
   const auto factors = formFactorsAboveBoth(place.position, place.normal, spot.shading, corners);
-  if (factors.shading <= 0.0) return 0.0;
-  std::array<double, 2> weights{};
-  if (looks == Looks::kAll) return factors.shading * seenPart(lamp, spot, key, 0, kAllLooks, weights);
-  const double first = seenPart(lamp, spot, key, 0, kFirstLooks, weights);
-  const bool agree = first <= 0.0 || first >= 1.0;
+  if (factors.shading <= 0.0) return glm::dvec3(0.0);
+  Seen seen;
+  if (looks == Looks::kAll) {
+    look(lamp, spot, key, 0, kAllLooks, seen);
+    return factors.shading * seen.mean();
+  }
+  look(lamp, spot, key, 0, kFirstLooks, seen);
+  const auto first = seen.mean();
+  const bool agree = seen.agree();
   if (agree && uniformFromKey(key) >= kAskAgain) return factors.shading * first;
-  const double all = seenPart(lamp, spot, key, kFirstLooks, kAllLooks, weights);
+  look(lamp, spot, key, kFirstLooks, kAllLooks, seen);
   // Those that are asked although the first agree stand for those that are not: else what lies just within the edge of
   // a shadow would count as all dark, or all lit, too often.
-  return factors.shading * (agree ? first + (all - first) / kAskAgain : all);
+  return factors.shading * (agree ? first + (seen.mean() - first) / kAskAgain : seen.mean());
 }
 
-/// By points first .. end - 1 of the lamp, and by what `weights` has of others: of what is seen, of all.
-double PlaceLight::seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
-                            std::uint32_t end, std::array<double, 2>& weights) const {
+/// By points first .. end - 1 of the lamp, beside those that were seen before.
+void PlaceLight::look(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
+                      std::uint32_t end, Seen& seen) const {
   const auto& place = spot.place;
   const Sobol4 draws(key);
   std::array<glm::dvec3, kAllLooks> point;
@@ -418,32 +431,17 @@ double PlaceLight::seenPart(const LightPolygon& lamp, const Spot& spot, std::uin
     const double leaves = -glm::dot(glm::dvec3(lamp.normal), way), square = glm::dot(way, way);
     if (glm::dot(place.normal, way) > 0.0 && leaves > 0.0)
       weight[k] = std::max(0.0, glm::dot(spot.shading, way)) * leaves / (square * square);
-    weights[1] += weight[k];
+    seen.all += weight[k];
   }
-  const auto open = areOpen(place, std::span(point).subspan(first, end - first), glm::dvec3(lamp.normal), key + first);
-  for (auto k = first; k < end; ++k) weights[0] += open[k - first] ? weight[k] : 0.0;
-  return weights[1] > 0.0 ? weights[0] / weights[1] : 0.0;
-}
-
-/// Whether nothing lies on the ways to points of a lamp, geometry::kPacket of which are asked together.
-std::bitset<PlaceLight::kMostLooks> PlaceLight::areOpen(const LeafRays::Place& from, std::span<const glm::dvec3> points,
-                                                        const glm::dvec3& normal, std::uint64_t key) const {
-  std::bitset<kMostLooks> open;
-  if (!patches_.opacity.empty()) {
-    for (std::size_t k = 0; k < points.size(); ++k) open[k] = isOpen(from, points[k], normal, mixKeys(key, k));
-    return open;
+  const auto of = std::span(point).subspan(first, end - first);
+  std::array<glm::dvec3, kAllLooks> passing;
+  tinted_.passageTo(place, of, glm::dvec3(lamp.normal), key + first, passing);
+  for (auto k = first; k < end; ++k) {
+    const auto& passes = passing[k - first];
+    if (passes == glm::dvec3(0.0)) continue;
+    seen.part += weight[k];
+    seen.light += weight[k] * passes;
   }
-  LeafRays::Points ends;
-  for (const auto& point : points) {
-    const glm::vec3 end(point + kLift * normal);
-    ends.x.push_back(end.x);
-    ends.y.push_back(end.y);
-    ends.z.push_back(end.z);
-  }
-  std::array<std::int32_t, kMostLooks> hidden;
-  rays_->hide(LeafRays::startOf(from), ends, hidden.data());
-  for (std::size_t k = 0; k < points.size(); ++k) open[k] = hidden[k] == 0;
-  return open;
 }
 
 glm::dvec3 PlaceLight::fromSomeLamps(const Spot& spot, std::uint64_t key) const {
@@ -461,25 +459,11 @@ glm::dvec3 PlaceLight::fromSomeLamps(const Spot& spot, std::uint64_t key) const 
     const double leaves = -glm::dot(glm::dvec3(lamp.normal), way), square = glm::dot(way, way);
     const double arrives = glm::dot(place.normal, way) > 0.0 ? glm::dot(spot.shading, way) : 0.0;
     if (!(arrives > 0.0 && leaves > 0.0)) continue;
-    if (!isOpen(place, point, glm::dvec3(lamp.normal), mixKeys(key, k))) continue;
-    sum +=
-        lamp.area * arrives * leaves / (std::numbers::pi * square * square * drawn.chance) * glm::dvec3(lamp.emission);
+    const auto passes = tinted_.passageTo(place, point, glm::dvec3(lamp.normal), mixKeys(key, k));
+    sum += lamp.area * arrives * leaves / (std::numbers::pi * square * square * drawn.chance) * passes *
+           glm::dvec3(lamp.emission);
   }
   return sum / static_cast<double>(kDraws);
-}
-
-/// What one can see through stops a way or not, by chance from `key`.
-bool PlaceLight::isOpen(const LeafRays::Place& from, const glm::dvec3& to, const glm::dvec3& normal,
-                        std::uint64_t key) const {
-  if (patches_.opacity.empty()) return rays_->isOpen(from, to, normal);
-  const auto way = to - from.position;
-  const double length = glm::length(way);
-  if (!(length > kNearEnd)) return false;
-  LeafRays::Place end;
-  const auto value = rays_->see(from, way / length, key, end);
-  if (LeafRays::isSky(value)) return true;
-  const double leaves = normal == glm::dvec3(0.0) ? 1.0 : -glm::dot(normal, way) / length;
-  return leaves > 0.0 && leaves * (length - glm::distance(end.position, from.position)) <= kNearEnd;
 }
 
 }  // namespace radiosity::solver

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <bitset>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -23,6 +22,7 @@
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
 #include "server/solver/surface/bright_leaves.h"
+#include "server/solver/surface/tinted_rays.h"
 
 namespace radiosity::solver {
 
@@ -116,19 +116,23 @@ class PlaceLight {
   [[nodiscard]] glm::dvec3 leaving(std::uint32_t value, const LeafRays::Place& end, std::uint64_t key,
                                    std::size_t steps) const;
   [[nodiscard]] glm::dvec3 direct(const Spot& spot, std::uint64_t key, Looks looks) const;
-  [[nodiscard]] double fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
-  [[nodiscard]] double fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const;
+  [[nodiscard]] glm::dvec3 fromLampOfSize(const Lamp& lamp, const Spot& spot, std::uint64_t key) const;
+  [[nodiscard]] glm::dvec3 fromLamp(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, Looks looks) const;
   [[nodiscard]] glm::dvec3 fromSomeLamps(const Spot& spot, std::uint64_t key) const;
-  [[nodiscard]] double seenPart(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first,
-                                std::uint32_t end, std::array<double, 2>& weights) const;
-  [[nodiscard]] std::bitset<kMostLooks> areOpen(const LeafRays::Place& from, std::span<const glm::dvec3> points,
-                                                const glm::dvec3& normal, std::uint64_t key) const;
-  [[nodiscard]] bool isOpen(const LeafRays::Place& from, const glm::dvec3& to, const glm::dvec3& normal,
-                            std::uint64_t key) const;
-
+  /// Of points of a lamp: the part that is seen, by what each brings, and the colour of what comes from there.
+  struct Seen {
+    double part = 0.0, all = 0.0;
+    glm::dvec3 light{0.0};  ///< of `all`, by channel
+    [[nodiscard]] glm::dvec3 mean() const { return all > 0.0 ? light / all : glm::dvec3(0.0); }
+    /// Nothing is hidden, or all is.
+    [[nodiscard]] bool agree() const { return part <= 0.0 || part >= all; }
+  };
+  void look(const LightPolygon& lamp, const Spot& spot, std::uint64_t key, std::uint32_t first, std::uint32_t end,
+            Seen& seen) const;
   const scene::PatchScene& patches_;
   std::shared_ptr<std::vector<Side>> sides_;  ///< rays made here refer to them, wherever this is moved to
   std::shared_ptr<const LeafRays> rays_;
+  TintedRays tinted_;  ///< these
   std::shared_ptr<const scene::ShadingNormals> normals_;
   std::vector<LightPolygon> lamps_;  ///< each by itself; empty: there are too many, or none
   std::optional<LightTree> many_;

@@ -96,19 +96,19 @@ TEST(WildValues, AFarRepeatOfATextureIsLikeTheFirst) {
   // In [0, 1] the alphas are 1 and 0 by turns: what lies beyond would be a lookup that mixes pixels far from its place.
   const Texture texture = stripes(16'384, 1);
   TextureUse use;
-  const AlphaTexture alpha(texture, use);
+  const PlainTexture alpha(texture, use);
   for (const float u : kWild) {
-    const float here = alpha.at({u, 0.5F});
+    const float here = alpha.alphaAt({u, 0.5F});
     EXPECT_TRUE(here >= 0.0F && here <= 1.0F) << u << ": " << here;
   }
   // Whole numbers, from the first to those beyond any integer, are the seam between the last pixel and the first.
   for (const float u : {1.0F, 64.0F, 99'999.0F, 131'072.0F, 1e9F, 1e20F, -3e38F}) {
-    EXPECT_EQ(alpha.at({u, 0.5F}), alpha.at({0.0F, 0.5F})) << u;
+    EXPECT_EQ(alpha.alphaAt({u, 0.5F}), alpha.alphaAt({0.0F, 0.5F})) << u;
   }
-  EXPECT_EQ(alpha.at({70'000.5F, 0.5F}), alpha.at({0.5F, 0.5F}));
+  EXPECT_EQ(alpha.alphaAt({70'000.5F, 0.5F}), alpha.alphaAt({0.5F, 0.5F}));
   use.repeat_u = false;  // the last pixel goes on for ever
-  EXPECT_EQ(alpha.at({3e38F, 0.5F}), 0.0F);
-  EXPECT_EQ(alpha.at({-3e38F, 0.5F}), 1.0F);
+  EXPECT_EQ(alpha.alphaAt({3e38F, 0.5F}), 0.0F);
+  EXPECT_EQ(alpha.alphaAt({-3e38F, 0.5F}), 1.0F);
 }
 
 TEST(WildValues, AFootprintThatIsNoNumberIsAPoint) {

@@ -74,6 +74,27 @@ TEST(SceneChange, glassThatReflectsOtherwiseIsAnotherShapeThoughAsMuchPasses) {
   EXPECT_TRUE(changeBetween(before, after).geometry);
 }
 
+// A factor of metal is 1 where its texture says where metal is, so that factors alone would let nothing pass.
+TEST(SceneChange, whateverDecidesWhatPassesIsShape) {
+  Scene before = textured();
+  auto& glass = before.materials[0];
+  glass.transmission = 0.5F;
+  glass.metallic = 1.0F;
+  glass.transmission_texture.texture = 0;
+  const auto expectShape = [&](const auto& edit) {
+    Scene after = before;
+    edit(after.materials[0]);
+    EXPECT_TRUE(changeBetween(before, after).geometry);
+  };
+  expectShape([](scene::Material& m) { m.base_color.r = 0.5F; });
+  expectShape([](scene::Material& m) { m.transmission = 0.6F; });
+  expectShape([](scene::Material& m) { m.attenuation.g = 0.5F; });
+  expectShape([](scene::Material& m) { m.metallic = 0.5F; });
+  expectShape([](scene::Material& m) { m.transmission_texture.texture = 1; });
+  expectShape([](scene::Material& m) { m.base_color_texture.texture = 1; });
+  expectShape([](scene::Material& m) { m.metallic_texture.texture = 0; });
+}
+
 TEST(SceneChange, aFilterOfACutOutMovesItsEdgeAndSoChangesTheShape) {
   Scene before = textured();
   before.materials[0].alpha_mode = scene::AlphaMode::kMask;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
 
 #include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/shapes.h"
@@ -92,6 +94,74 @@ TEST(Opacity, WithoutAnInterfaceTransmissionLetsItsFactorThroughWhateverTheMode)
     place(scene, floorQuad(1.0), glm::dmat4(1.0), clear);
     EXPECT_NEAR(leafArea(build(scene, 64)), 0.25, 2e-3);
   }
+}
+
+/// A pane of glass of this colour, under a texture of pixels in a row, RGB, that spans it once.
+Scene pane(const glm::vec3& colour, const std::vector<std::array<std::uint8_t, 3>>& pixels, bool are_a_mask) {
+  Scene scene;
+  Texture texture;
+  texture.width = static_cast<int>(pixels.size());
+  texture.height = 1;
+  texture.srgb = false;
+  for (const auto& pixel : pixels) texture.rgba.insert(texture.rgba.end(), {pixel[0], pixel[1], pixel[2], 255});
+  Primitive p = floorQuad(1.0);
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material glass;
+  glass.base_color = colour;
+  glass.transmission = 1.0F;
+  if (!pixels.empty()) {
+    scene.textures.push_back(std::move(texture));
+    auto& use = are_a_mask ? glass.transmission_texture : glass.base_color_texture;
+    use.texture = 0;
+    use.nearest = true;
+  }
+  place(scene, p, glm::dmat4(1.0), glass);
+  return scene;
+}
+
+TEST(Opacity, ClearGlassHasNoTint) {
+  const auto patches = build(pane(glm::vec3(0.5F), {}, false), 64);
+  EXPECT_TRUE(patches.tints.empty());
+  EXPECT_TRUE(patches.leaf_tints.empty());
+  EXPECT_EQ(patches.surfaces[0].first_tint, kNone);
+  EXPECT_NEAR(patches.opacity[0], 255.0 * (1.0 - 0.96 * 0.5), 1.0);
+}
+
+TEST(Opacity, OfColouredGlassTheChannelPassesThatDoesBest) {
+  const auto patches = build(pane({0.2F, 0.8F, 0.4F}, {}, false), 64);
+  ASSERT_EQ(patches.surfaces[0].first_tint, 0U);
+  EXPECT_NEAR(patches.opacity[0], 255.0 * (1.0 - 0.96 * 0.8), 1.0);
+  const auto tint = patches.tintAt(patches.surfaces[0], {1.0F, 1.0F});
+  EXPECT_NEAR(tint.r, 0.25F, 0.003F);
+  EXPECT_EQ(tint.g, 1.0F);
+  EXPECT_NEAR(tint.b, 0.5F, 0.003F);
+  for (const auto& leaf : patches.leaf_tints) EXPECT_LT(glm::distance(leaf, tint), 1e-5F);
+}
+
+// Rays pass each half alike, so that of all that pass half has each colour.
+TEST(Opacity, ALeafOfTwoColoursHasTheirMean) {
+  std::vector<std::array<std::uint8_t, 3>> stripes;
+  for (int i = 0; i < 64; ++i)
+    stripes.push_back(i % 2 == 0 ? std::array<std::uint8_t, 3>{255, 0, 0} : std::array<std::uint8_t, 3>{0, 0, 255});
+  const auto patches = build(pane(glm::vec3(1.0F), stripes, false), 16);
+  const auto& surface = patches.surfaces[0];
+  ASSERT_NE(surface.first_tint, kNone);
+  ASSERT_GE(surface.opacity_scale, 16U);
+  for (const auto& leaf : patches.leaf_tints) EXPECT_LT(glm::distance(leaf, glm::vec3(0.5F, 0.0F, 0.5F)), 0.02F);
+  const auto at = [&](float pixel) {
+    return patches.tintAt(surface, {static_cast<float>(surface.width) * (pixel + 0.5F) / 64.0F, 0.5F});
+  };
+  EXPECT_EQ(at(20.0F), glm::vec3(1.0F, 0.0F, 0.0F));
+  EXPECT_EQ(at(21.0F), glm::vec3(0.0F, 0.0F, 1.0F));
+}
+
+TEST(Opacity, TransmissionHasItsTextureAtThePlace) {
+  const auto patches = build(pane(glm::vec3(1.0F), {{{255, 0, 0}}, {{0, 255, 255}}}, true), 256);
+  const auto& surface = patches.surfaces[0];
+  const auto width = static_cast<float>(surface.width), height = static_cast<float>(surface.height);
+  EXPECT_NEAR(patches.opacityAt(surface, {0.25F * width, 0.5F * height}), 255.0 * 0.04, 1.0);
+  EXPECT_EQ(patches.opacityAt(surface, {0.75F * width, 0.5F * height}), 255);
+  EXPECT_TRUE(patches.tints.empty()) << "a mask has no colour";
 }
 
 TEST(Opacity, AFineTextureGetsAFineGrid) {
