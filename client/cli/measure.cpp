@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "client/cli/editor.h"
 #include "client/lib/atomic_file.h"
 #include "client/lib/http.h"
 #include "common/one_line.h"
@@ -35,6 +36,22 @@ std::string verdictText(const protocol::Plane& plane) {
   return text + plane.verdict.all + " at 95 %";
 }
 
+Error noPlane() {
+  return {ErrorCode::kBadInput,
+          "the scene has no measuring plane: a node with extras.radiosityPlane, such as {\"width\": 2, \"depth\": 3}",
+          {}};
+}
+
+bool isPlane(const Json& node) {
+  return node.is_object() && node.contains("extras") && node["extras"].is_object() &&
+         node["extras"].contains("radiosityPlane");
+}
+
+bool isCalled(const Json& node, std::size_t index, const std::string& plane) {
+  const auto name = node.find("name");
+  return std::to_string(index) == plane || (name != node.end() && name->is_string() && *name == plane);
+}
+
 }  // namespace
 
 void addMeasureOptions(CLI::App& command, MeasureOptions& options) {
@@ -44,6 +61,21 @@ void addMeasureOptions(CLI::App& command, MeasureOptions& options) {
       ->type_name("NAME");
   command.add_flag("--daylight-factor", options.daylight_factor,
                    "also daylight factors, in percent: under a CIE overcast sky, all lamps off");
+}
+
+client::CallResult<void> requirePlanes(const Remote& remote, const MeasureOptions& options) {
+  const auto scene = fetchScene(remote);
+  if (!scene) return tl::unexpected(scene.error());
+  bool has_some = false;
+  const auto nodes = scene->gltf.value("nodes", Json::array());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (!isPlane(nodes[i])) continue;
+    has_some = true;
+    if (options.plane.empty() || isCalled(nodes[i], i, options.plane)) return {};
+  }
+  if (!has_some) return tl::unexpected(client::CallFailure{noPlane()});
+  return tl::unexpected(client::CallFailure{
+      {ErrorCode::kBadInput, "there is no measuring plane of this name, or on the node of this number", "--plane"}});
 }
 
 Result<std::string> measurePlanes(const Remote& remote, const MeasureOptions& options, ProgressDisplay& display) {
@@ -58,11 +90,7 @@ Result<std::string> measurePlanes(const Remote& remote, const MeasureOptions& op
   const auto planes = protocol::decodeHttpPlanes(reply->body);
   if (!planes)
     return fail(ErrorCode::kUnavailable, "the answer to /planes.json: " + planes.error().text(), remote.url.text());
-  if (planes->planes.empty())
-    return fail(
-        ErrorCode::kBadInput,
-        "the scene has no measuring plane: a node with extras.radiosityPlane, such as {\"width\": 2, \"depth\": "
-        "3}");
+  if (planes->planes.empty()) return tl::unexpected(noPlane());
   if (auto done = writeFile(options.csv, protocol::planesCsv(*planes)); !done) return tl::unexpected(done.error());
   if (auto done = writeFile(options.json, reply->body + "\n"); !done) return tl::unexpected(done.error());
   return planesText(*planes);

@@ -20,6 +20,10 @@ struct MeasureOptions {
 /// --csv, --json, --plane, --daylight-factor.
 void addMeasureOptions(CLI::App& command, MeasureOptions& options);
 
+/// Whether the server's scene has a plane to measure, before anybody waits for its light. kBadInput: it has none, or
+/// none of this name or number.
+[[nodiscard]] client::CallResult<void> requirePlanes(const Remote& remote, const MeasureOptions& options);
+
 /// Asks the server to measure, and writes the files that are asked for. Returns what to tell people: planesText().
 [[nodiscard]] Result<std::string> measurePlanes(const Remote& remote, const MeasureOptions& options,
                                                 ProgressDisplay& display);

@@ -84,6 +84,8 @@ class Solve {
     connection->onNotification([this](const protocol::Notification& note) { onNotification(note); });
     if (auto set = connection->call(settings()); !set) return complainOf(set.error());
     if (auto loaded = load(*connection); !loaded) return complainOf(loaded.error());
+    if (options_.measure.wanted)
+      if (auto ready = requirePlanes(remote_, options_.measure); !ready) return complainOf(ready.error());
     auto status = waitForEnd(*connection);
     if (!status) return complainOf(status.error());
     return finish(*connection, *std::move(status));

@@ -58,6 +58,12 @@ class MeasureTest(ServiceCase):
     def test_whatIsWrongIsSaidInOneLine(self):
         plates.write_glb(self.folder / "none.glb", plates.lit_document())
         self.assertIn("extras.radiosityPlane", self.complaint("measure", "none.glb", *QUICK))
+        # Nobody waits for light that is not asked for: an error of a millionth would take for ever.
+        endless = ("--error", 0.000001)
+        for command in (("measure", "none.glb"), ("solve", "none.glb", "-o", "lit.glb", "--measure", "p.csv")):
+            self.assertIn("no measuring plane", self.complaint(*command, *endless))
+        self.assertIn("of this name", self.complaint("measure", "planes.glb", "--plane", "shelf", *endless))
+        self.assertEqual(self.files(), ["none.glb", "planes.glb"])
         for change, place in (({"width": 0}, "/width"), ({"columns": 10**9}, "/columns"), ({"target": 5}, "/target")):
             with self.subTest(place=place):
                 scene = with_plane(plates.lit_document(), {**self.plane, **change})
