@@ -140,6 +140,57 @@ it('adds, changes and takes back area lights, whose light on the floor is their 
   expect(await hanging(page)).toContain(panel);
 });
 
+it('adds a spot and a point, and changes cones and radius, whose light on the floor is that of the closed form', async () => {
+  const { page } = await open();
+  await page.getByRole('tab', { name: 'Scene' }).click();
+  await page.getByRole('button', { name: 'Spot', exact: true }).click();
+  const node = (await until(() => lamp(page), (it) => it !== undefined))!; // prettier-ignore
+  const height = 1.5;
+  await place(page, height);
+  await write(page, 'Intensity, cd', 1000);
+  await write(page, 'Edge at, °', 45);
+  await write(page, 'Full to, °', 30);
+  const light = async () => {
+    await converged(page);
+    await lookDown(page);
+    await drawn(page);
+  };
+  /** On the floor at x, as KHR_lights_punctual has the falloff between the cones. */
+  const exact = (x: number) => {
+    const cosine = height / Math.hypot(height, x);
+    const [full, edge] = [Math.cos(Math.PI / 6), Math.cos(Math.PI / 4)];
+    return (1000 * Math.min(1, (cosine - edge) / (full - edge)) ** 2 * cosine ** 3) / height ** 2;
+  };
+  await light();
+  for (const x of [0, 0.5, 1.1]) expect((await lux(page, x, 0)) / exact(x)).toBeCloseTo(1, 1.5);
+  expect(await lux(page, 1.8, 0), 'beyond the edge').toBeCloseTo(0, 3);
+  const lumens = Number(await page.getByLabel('Flux, lm').inputValue());
+  const [full, edge] = [Math.cos(Math.PI / 6), Math.cos(Math.PI / 4)];
+  expect(lumens / (2000 * Math.PI * (1 - full + (full - edge) / 3))).toBeCloseTo(1, 3);
+  // The edge does not cross the inner cone, which gives way.
+  await write(page, 'Edge at, °', 20);
+  expect(Number(await page.getByLabel('Full to, °').inputValue())).toBeLessThan(20);
+  await page.getByRole('button', { name: 'Undo' }).click();
+  await answered(page);
+  expect(await page.getByLabel('Full to, °').inputValue()).toBe('30');
+  // A disc that looks down: on its axis E = I / (h^2 + r^2), and its edge is soft.
+  await write(page, 'Radius, m', 0.5);
+  await light();
+  expect((await lux(page, 0, 0)) / (1000 / (height ** 2 + 0.25))).toBeCloseTo(1, 1.5);
+  expect(await lux(page, 1.8, 0)).toBeGreaterThan(1);
+  await page.getByRole('button', { name: 'Remove', exact: true }).click();
+  await answered(page);
+  expect(await hanging(page)).not.toContain(node);
+  await page.getByRole('button', { name: 'Point', exact: true }).click();
+  await until(() => lamp(page), (it) => it !== undefined && it !== node); // prettier-ignore
+  await place(page, height);
+  await write(page, 'Intensity, cd', 1000);
+  await write(page, 'Radius, m', 0.4); // a ball brings what its middle would
+  await light();
+  for (const x of [0, 1])
+    expect((await lux(page, x, 0)) / ((1000 * height) / (height ** 2 + x * x) ** 1.5)).toBeCloseTo(1, 1.5);
+});
+
 it('adds a lamp with a photometric file, shows its web, and lights the floor by it', async () => {
   const { page } = await open();
   await page.getByRole('tab', { name: 'Scene' }).click();
