@@ -136,7 +136,7 @@ std::optional<Error> WorkerProcess::ending() const {
 
 std::string WorkerProcess::epitaph() const {
   // A closed socket means that it is ending; one that could not be used does not.
-  constexpr int kTries = 50;
+  constexpr int kTries = 300;  // of a large one, on a busy machine, it takes a while
   for (int i = 0; i < kTries; ++i) {
     if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
     if (const auto ended = ending()) return ended->message;

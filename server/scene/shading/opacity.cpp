@@ -248,9 +248,13 @@ class SurfaceOpacity {
   [[nodiscard]] std::size_t cellAt(std::uint32_t x, std::uint32_t y) const {
     return surface_.first_opacity + std::size_t{y} * width_ + x;
   }
+  /// Of PatchScene::tints, for one of PatchScene::opacity.
+  [[nodiscard]] std::size_t tintCell(std::size_t cell) const {
+    return cell - surface_.first_opacity + surface_.first_tint_cell;
+  }
   void setCell(std::size_t cell, const glm::vec3& stopped) {
     patches_.opacity[cell] = byteOf(std::min({stopped.r, stopped.g, stopped.b}));
-    if (has_tints_) patches_.tints[cell - surface_.first_opacity + surface_.first_tint_cell] = tintOf(1.0F - stopped);
+    if (has_tints_) patches_.tints[tintCell(cell)] = tintOf(1.0F - stopped);
   }
 
   void fillTriangle(const ChartCorners& c, std::uint32_t first_row, std::uint32_t end_row) {
@@ -281,8 +285,7 @@ class SurfaceOpacity {
         if (known_[std::size_t{ny} * width_ + nx] == 0) continue;
         const auto to = cellAt(x, y), from = cellAt(nx, ny);
         patches_.opacity[to] = patches_.opacity[from];
-        const auto tint = surface_.first_tint_cell - surface_.first_opacity;  // as unsigned numbers wrap
-        if (has_tints_) patches_.tints[to + tint] = patches_.tints[from + tint];
+        if (has_tints_) patches_.tints[tintCell(to)] = patches_.tints[tintCell(from)];
         return;
       }
     }

@@ -24,8 +24,10 @@ constexpr std::uint32_t kFirstLooks = 4, kAllLooks = 16;
 constexpr double kMostAStep = 4.0;
 /// Where the first agree the others are made with this chance.
 constexpr double kAskAgain = 0.25;
-/// First looks of leaves that are looked from together: a few hundredths of a second.
-constexpr std::uint32_t kLeavesAtOnce = 4096;
+/// Leaves, or blocks of them, that are looked from together at first: a few tenths of a second at most.
+constexpr std::uint32_t kLeavesAtOnce = 2048;
+/// Of these, between two points where the work may be interrupted.
+constexpr std::uint32_t kLeavesBetween = 16;
 /// Looks that differ by no more see one colour.
 constexpr float kSameTint = 0.01F;
 /// Of the width of a leaf: a ball around its middle.
@@ -46,25 +48,6 @@ SourceLook lookAtPoint(const LeafRays::Place& place, const glm::dvec3& point, co
   return {way, arrives * leaves / (square * square)};
 }
 
-/// Where some are seen through glass of several colours, or through none.
-struct Seen {
-  double part = 0.0;
-  glm::dvec3 light{0.0}, least{1.0}, most{0.0};
-
-  void add(double brings, const LeafRays::Passage& passage) {
-    if (!(brings * passage.part > 0.0)) return;
-    part += brings * passage.part;
-    light += brings * passage.light();
-    least = glm::min(least, passage.tint);
-    most = glm::max(most, passage.tint);
-  }
-  [[nodiscard]] bool differs() const {
-    const auto range = most - least;
-    return part > 0.0 && std::max({range.x, range.y, range.z}) > static_cast<double>(kSameTint);
-  }
-  [[nodiscard]] glm::dvec3 tint() const { return light / part; }
-};
-
 /// So that a pane of one colour makes one run of links.
 glm::vec3 rounded(const glm::dvec3& tint) {
   constexpr double kSteps = 65536.0;
@@ -72,6 +55,19 @@ glm::vec3 rounded(const glm::dvec3& tint) {
 }
 
 }  // namespace
+
+void LightTints::Seen::add(double brings, const LeafRays::Passage& passage) {
+  if (!(brings * passage.part > 0.0)) return;
+  part += brings * passage.part;
+  light += brings * passage.light();
+  least = glm::min(least, passage.tint);
+  most = glm::max(most, passage.tint);
+}
+
+bool LightTints::Seen::differs() const {
+  const auto range = most - least;
+  return part > 0.0 && std::max({range.x, range.y, range.z}) > static_cast<double>(kSameTint);
+}
 
 LightTints::Sender LightTints::of(const LightPolygon& lamp) {
   const auto ball = lamp.ball();
@@ -205,7 +201,8 @@ void LightTints::plan() {
   auto& block = known_[at_].block;
   block = static_cast<std::uint32_t>(std::clamp<std::uint64_t>((leaves + most - 1) / most, 1, 1U << 20U));
   for (const auto s : sides) {
-    const auto rows = std::max(1U, kLeavesAtOnce / std::max(1U, sides_[s].width / block));
+    const auto width = std::max(1U, sides_[s].width), together = std::max(1U, kLeavesAtOnce / times_) * block;
+    const auto down = std::max(1U, block / width), rows = std::max(1U, together / width / down) * down;
     for (std::uint32_t first = 0; first < sides_[s].height; first += rows)
       pending_.push_back({s, first, std::min(sides_[s].height, first + rows)});
   }
@@ -249,33 +246,38 @@ void LightTints::finish() {
   next_ = 0;
 }
 
-/// Nothing: no look sees anything of the sender. `is_edge`: it is looked from as often as there is reason to anywhere.
-/// Of other leaves of which the first looks agree some are asked for more all the same, and stand for the others: else
-/// what takes a small part of the light would count for less than it is.
-std::optional<glm::vec3> LightTints::ask(std::uint32_t value, std::size_t half, bool is_edge) const {
-  const auto& side = rays_->sideOf(value);
-  const auto& sender = senders_[at_];
-  const auto of_leaf = mixKeys(mixKeys(seed_, side.key), std::uint64_t{value - side.first_value});
-  const auto key = mixKeys(mixKeys(of_leaf, sender.key), half);
+/// Looks first to end - 1 of a leaf.
+void LightTints::look(std::uint32_t value, std::uint64_t key, std::uint32_t first, std::uint32_t end,
+                      Seen& seen) const {
   const Sobol4 draws(key);
-  Seen seen;
-  const auto look = [&](std::uint32_t first, std::uint32_t end) {
-    for (auto k = first; k < end; ++k) {
-      const auto draw = draws(k);
-      const auto place = rays_->placeOn(value, {draw.x, draw.y});
-      const auto at = sender.look(place, {draw.z, draw.w});
-      if (at.brings > 0.0 && glm::dot(place.normal, at.way) > 0.0)
-        seen.add(at.brings, rays_->passageTo(place, place.position + at.way));
-    }
-  };
-  look(0, kFirstLooks);
+  for (auto k = first; k < end; ++k) {
+    const auto draw = draws(k);
+    const auto place = rays_->placeOn(value, {draw.x, draw.y});
+    const auto at = senders_[at_].look(place, {draw.z, draw.w});
+    if (at.brings > 0.0 && glm::dot(place.normal, at.way) > 0.0)
+      seen.add(at.brings, rays_->passageTo(place, place.position + at.way));
+  }
+}
+
+std::uint64_t LightTints::keyOf(std::uint32_t value, std::size_t half) const {
+  const auto& side = rays_->sideOf(value);
+  const auto of_leaf = mixKeys(mixKeys(seed_, side.key), std::uint64_t{value - side.first_value});
+  return mixKeys(mixKeys(of_leaf, senders_[at_].key), half);
+}
+
+/// Of a leaf whose first looks are done. Those at edges are looked from as often as there is reason to; of others of
+/// which the first looks agree some are, and stand for the others: else what takes a small part of the light would
+/// count for less than it is. Nothing: no look sees anything of the sender.
+std::optional<glm::vec3> LightTints::ask(std::uint32_t value, std::size_t half, bool is_edge, Seen seen) const {
+  const auto key = keyOf(value, half);
+  const double chance = std::min(1.0, kAskAgain * times_);
   const bool asks_all = is_edge || seen.differs();
-  if (!asks_all && (!(seen.part > 0.0) || uniformFromKey(mixKeys(key, kTintSeed)) >= kAskAgain))
+  if (!asks_all && (!(seen.part > 0.0) || uniformFromKey(mixKeys(key, kTintSeed)) >= chance))
     return seen.part > 0.0 ? std::optional(rounded(seen.tint())) : std::nullopt;
   const auto first = seen.part > 0.0 ? seen.tint() : glm::dvec3(1.0);
-  look(kFirstLooks, times_ * kAllLooks);
+  look(value, key, kFirstLooks, times_ * kAllLooks, seen);
   if (!(seen.part > 0.0)) return std::nullopt;
-  return rounded(!asks_all && seen.differs() ? first + (seen.tint() - first) / kAskAgain : seen.tint());
+  return rounded(!asks_all && seen.differs() ? first + (seen.tint() - first) / chance : seen.tint());
 }
 
 std::array<LinkTint, 2> LightTints::lookFrom(const Rows& rows) const { return {lookFrom(rows, 0), lookFrom(rows, 1)}; }
@@ -284,63 +286,73 @@ std::array<LinkTint, 2> LightTints::lookFrom(const Rows& rows) const { return {l
 /// do, or else of all of these rows.
 LinkTint LightTints::lookFrom(const Rows& rows, std::size_t half) const {
   const auto& side = sides_[rows.side];
-  const auto& sender = senders_[at_];
-  const auto block = known_[at_].block, columns = (side.width + block - 1) / block, height = rows.end - rows.first;
-  const auto askBlock = [&](std::uint32_t row, std::uint32_t column, bool is_edge) -> std::optional<glm::vec3> {
-    for (auto x = column * block; x < std::min(side.width, (column + 1) * block); ++x) {
-      const auto value = side.first_value + (rows.first + row) * side.width + x;
-      if (!(rays_->areaOf(value) > 0.0)) continue;
-      const auto middle = rays_->placeOn(value, {0.5, 0.5});
-      const bool may = mayTint(sender, middle.position, kAroundLeaf * rays_->widthOf(value));
-      return may ? ask(value, half, is_edge) : glm::vec3(1.0F);
-    }
-    return std::nullopt;
+  const auto block = known_[at_].block;
+  // Blocks are parts of a row, or whole rows.
+  const auto across = std::min(block, side.width), down = std::max(1U, block / side.width);
+  const auto columns = (side.width + across - 1) / across, height = (rows.end - rows.first + down - 1) / down;
+  struct Block {
+    std::uint32_t value = scene::kNone;  ///< the leaf that is asked; kNone: none has area
+    bool may_tint = false;
+    Seen first;
   };
-  std::vector<std::optional<glm::vec3>> found(std::size_t{columns} * height);
-  glm::vec3 sum(0.0F);
-  float count = 0.0F;
-  for (std::uint32_t i = 0; i < found.size(); ++i) {
-    if (i % columns == 0) interruptionPoint();
-    found[i] = askBlock(i / columns, i % columns, false);
+  std::vector<Block> blocks(std::size_t{columns} * height);
+  const auto rowOf = [&](std::uint32_t i) { return rows.first + i / columns * down; };
+  for (std::uint32_t i = 0; i < blocks.size(); ++i) {
+    if (i % kLeavesBetween == 0) interruptionPoint();
+    auto& one = blocks[i];
+    const auto begin = i % columns * across, end = std::min(side.width, begin + across);
+    for (auto x = begin; x < end && one.value == scene::kNone; ++x) {
+      const auto value = side.first_value + rowOf(i) * side.width + x;
+      if (rays_->areaOf(value) > 0.0) one.value = value;
+    }
+    if (one.value == scene::kNone) continue;
+    const auto middle = rays_->placeOn(one.value, {0.5, 0.5});
+    one.may_tint = mayTint(senders_[at_], middle.position, kAroundLeaf * rays_->widthOf(one.value));
+    if (one.may_tint) look(one.value, keyOf(one.value, half), 0, kFirstLooks, one.first);
   }
+  const auto firstTint = [&](const Block& one) { return one.may_tint ? one.first.tint() : glm::dvec3(1.0); };
   const auto isEdge = [&](std::uint32_t i) {
-    const auto x = i % columns, y = i / columns;
     const auto differs = [&](bool is_there, std::uint32_t other) {
-      return is_there && found[i] && found[other] && glm::distance(*found[i], *found[other]) > kSameTint;
+      if (!is_there || blocks[i].value == scene::kNone || blocks[other].value == scene::kNone) return false;
+      const auto sees = [](const Block& one) { return !one.may_tint || one.first.part > 0.0; };
+      return sees(blocks[i]) && sees(blocks[other]) &&
+             glm::distance(firstTint(blocks[i]), firstTint(blocks[other])) > static_cast<double>(kSameTint);
     };
+    const auto x = i % columns, y = i / columns;
     return differs(x > 0, i - 1) || differs(x + 1 < columns, i + 1) || differs(y > 0, i - columns) ||
            differs(y + 1 < height, i + columns);
   };
-  std::vector<std::uint32_t> edges;
-  for (std::uint32_t i = 0; i < found.size(); ++i)
-    if (isEdge(i)) edges.push_back(i);
-  for (const auto i : edges) found[i] = askBlock(i / columns, i % columns, true);
-  for (const auto& one : found) {
-    if (!one) continue;
-    sum += *one;
+  std::vector<std::optional<glm::vec3>> found(blocks.size());
+  glm::vec3 sum(0.0F);
+  float count = 0.0F;
+  for (std::uint32_t i = 0; i < blocks.size(); ++i) {
+    if (i % kLeavesBetween == 0) interruptionPoint();
+    const auto& one = blocks[i];
+    if (one.value == scene::kNone) continue;
+    found[i] = one.may_tint ? ask(one.value, half, isEdge(i), one.first) : glm::vec3(1.0F);
+    if (!found[i]) continue;
+    sum += *found[i];
     count += 1.0F;
   }
-  const auto beside = [&](std::uint32_t row, std::uint32_t column) {
+  const auto beside = [&](std::uint32_t i) {
     glm::vec3 mean(0.0F);
     float known = 0.0F;
+    const auto row = i / columns, column = i % columns;
     for (auto y = row - std::min(row, 1U); y < std::min(row + 2, height); ++y) {
       for (auto x = column - std::min(column, 1U); x < std::min(column + 2, columns); ++x) {
-        const auto& one = found[std::size_t{y} * columns + x];
-        if (!one) continue;
+        const auto& near = found[std::size_t{y} * columns + x];
+        if (!near) continue;
         known += 1.0F;
-        mean += *one;
+        mean += *near;
       }
     }
     return known > 0.0F ? mean / known : sum / count;
   };
   LinkTint tint;
-  for (std::uint32_t row = 0; row < height && count > 0.0F; ++row) {
-    for (std::uint32_t column = 0; column < columns; ++column) {
-      const auto& own = found[std::size_t{row} * columns + column];
-      const auto x = column * block;
-      tint.add(side.first_value + (rows.first + row) * side.width + x, std::min(block, side.width - x),
-               own ? *own : beside(row, column));
-    }
+  for (std::uint32_t i = 0; i < found.size() && count > 0.0F; ++i) {
+    const auto x = i % columns * across, lines = std::min(down, rows.end - rowOf(i));
+    tint.add(side.first_value + rowOf(i) * side.width + x,
+             down > 1 ? lines * side.width : std::min(across, side.width - x), found[i] ? *found[i] : beside(i));
   }
   return tint;
 }

@@ -73,7 +73,7 @@ class LightTints {
  private:
   struct Known {
     std::uint64_t key = 0;
-    std::uint32_t times = 0, block = 0;  ///< of the latter: leaves in a row of one colour; 0: not known yet
+    std::uint32_t times = 0, block = 0;  ///< of the latter: leaves in a row, or rows, of one colour; 0: not known yet
     bool is_whole = false;
     std::array<std::shared_ptr<const LinkTint>, 2> tint;
   };
@@ -87,7 +87,18 @@ class LightTints {
   void finish();
   [[nodiscard]] std::array<LinkTint, 2> lookFrom(const Rows& rows) const;
   [[nodiscard]] LinkTint lookFrom(const Rows& rows, std::size_t half) const;
-  [[nodiscard]] std::optional<glm::vec3> ask(std::uint32_t value, std::size_t half, bool is_edge) const;
+  /// What looks see, maybe through glass of several colours, or through none.
+  struct Seen {
+    double part = 0.0;
+    glm::dvec3 light{0.0}, least{1.0}, most{0.0};
+
+    void add(double brings, const LeafRays::Passage& passage);
+    [[nodiscard]] bool differs() const;
+    [[nodiscard]] glm::dvec3 tint() const { return light / part; }
+  };
+  [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, std::size_t half) const;
+  void look(std::uint32_t value, std::uint64_t key, std::uint32_t first, std::uint32_t end, Seen& seen) const;
+  [[nodiscard]] std::optional<glm::vec3> ask(std::uint32_t value, std::size_t half, bool is_edge, Seen seen) const;
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;

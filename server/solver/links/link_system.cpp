@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <utility>
 
 #include "common/check.h"
+#include "common/parallel.h"
 #include "server/solver/patches/unshot_pyramid.h"
 
 namespace radiosity::solver {
@@ -211,27 +213,33 @@ void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, Fr
 }
 
 double LinkSystem::tintNoise() const {
-  double square = 0.0;
-  std::array<std::vector<float>, 6> light;
-  for (const auto& shooter : shooters_) {
-    if (!shooter.tint[0] && !shooter.tint[1]) continue;
-    for (auto& plane : light) plane.assign(leaf_area_.size(), 0.0F);
+  std::vector<const Shooter*> tinted;
+  for (const auto& shooter : shooters_)
+    if (shooter.tint[0] || shooter.tint[1]) tinted.push_back(&shooter);
+  std::vector<double> squares(tinted.size());
+  inTurns(tinted.size(), [&](std::size_t i) {
+    const auto& shooter = *tinted[i];
     const auto& column = shooter.column[shooter.column[0].points() > 0.0 ? 0 : 1];
-    const glm::vec3 sent = 0.5F * (shooter.sent[0] + shooter.sent[1]);
-    for (std::size_t half = 0; half < 2; ++half) {
-      const std::array<float*, 3> planes{light[3 * half].data(), light[3 * half + 1].data(),
-                                         light[3 * half + 2].data()};
-      column.apply({sent.x, sent.y, sent.z}, planes);
-      if (shooter.tint[half]) shooter.tint[half]->apply(planes);
-    }
-    for (std::size_t c = 0; c < 3; ++c) {
-      for (std::size_t v = 0; v < leaf_area_.size(); ++v) {
-        const auto off = 0.5 * static_cast<double>(light[c][v] - light[3 + c][v]);
-        square += static_cast<double>(leaf_area_[v]) * off * off;
+    std::vector<float> links;
+    const auto tintOf = [&](std::size_t half, std::uint32_t value) {
+      return shooter.tint[half] ? shooter.tint[half]->at(value) : glm::vec3(1.0F);
+    };
+    const glm::vec3 sent = 0.5F * (static_cast<float>(shooter.carried(0)) * shooter.sent[0] +
+                                   static_cast<float>(shooter.carried(1)) * shooter.sent[1]);
+    for (const auto& run : column.runs()) {
+      for (auto s = run.side; s < run.side + run.side_count; ++s) {
+        links.assign(sides_[s].leaf_count, 0.0F);
+        if (!column.decode(sides_[s].first_value, links)) continue;
+        for (std::uint32_t leaf = 0; leaf < sides_[s].leaf_count; ++leaf) {
+          if (!(links[leaf] > 0.0F)) continue;
+          const auto value = sides_[s].first_value + leaf;
+          const glm::dvec3 off(0.5F * links[leaf] * sent * (tintOf(0, value) - tintOf(1, value)));
+          squares[i] += static_cast<double>(leaf_area_[value]) * glm::dot(off, off);
+        }
       }
     }
-  }
-  return square;
+  });
+  return std::reduce(squares.begin(), squares.end());
 }
 
 std::size_t LinkSystem::bytes() const {

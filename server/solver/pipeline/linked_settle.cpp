@@ -64,12 +64,12 @@ bool LinkedSolver::tintLinks() {
   if (!tints_.isNeeded()) return true;
   if (pass_ != Pass::kTints) {
     std::vector<LightTints::Sender> senders;
-    tinted_.clear();
+    looking_.clear();
     for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
       const auto& shooter = system_.shooters()[n];
       if (shooter.column[0].points() + shooter.column[1].points() <= 0.0) continue;
       if (shooter.crowd != scene::kNone && !crowds_[shooter.crowd].lamps) continue;
-      tinted_.push_back(n);
+      looking_.push_back(n);
       senders.push_back(shooter.light != scene::kNone    ? LightTints::of(lights_[shooter.light])
                         : shooter.source != scene::kNone ? LightTints::of(sources_[shooter.source])
                         : shooter.crowd != scene::kNone
@@ -80,6 +80,7 @@ bool LinkedSolver::tintLinks() {
     pass_ = Pass::kTints;
   }
   if (!tints_.advance(kSliceSeconds)) return false;
+  tinted_ = looking_;
   for (std::size_t i = 0; i < tinted_.size(); ++i) {
     for (std::size_t half = 0; half < 2; ++half) system_.shooters()[tinted_[i]].tint[half] = tints_.tint(i, half);
   }
@@ -180,6 +181,7 @@ void LinkedSolver::dropNodes() {
     lights.push_back(std::move(system_.shooters()[n]));
   }
   system_.clear();
+  tinted_.clear();
   for (const auto& light : lights) (void)system_.add(light);
   repair_.renumber(number);
 }

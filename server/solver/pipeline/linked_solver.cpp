@@ -332,6 +332,7 @@ void LinkedSolver::setTargetError(double target) {
   if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
       error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it
     tryNow([this] { gather_->giveUp(); });
+    if (pass_ != Pass::kTints) tints_.giveUp();
     wave_.endHere();
     settling_ = true;
   }
@@ -343,7 +344,8 @@ void LinkedSolver::setTargetError(double target) {
     while (error_.total <= aim_ && aimFurther()) continue;
     if (error_.total > settings_.target_error) (void)chooseFurther();
     if (error_.total <= settings_.target_error) from_links_ = FromLinks::kToConfirm;
-    while (from_links_ == FromLinks::kToConfirm && !(gather_ && gather_->isBehind())) (void)confirm();
+    const auto is_behind = [this] { return (gather_ && gather_->isBehind()) || tints_.isBehind() || lacksTint(); };
+    while (from_links_ == FromLinks::kToConfirm && !is_behind()) (void)confirm();
   });
 }
 

@@ -264,7 +264,8 @@ class LinkedSolver final : public Solver {
   std::shared_ptr<const SpecularLeaves> mirrors_;  // null: none
   LightTints tints_;                               // of light over links
   double tint_noise_ = 0.0;                        // LinkSystem::tintNoise(), of the light that there is
-  /// Shooters that these are of, ascending.
+  std::vector<std::uint32_t> looking_;             // shooters that are being looked at for it
+  /// Those of which it is known, ascending.
   std::vector<std::uint32_t> tinted_;  // shooters that these are of
   ImagedLight::Lamps lamp_images_, source_images_;
   float least_imaged_ = 0.0F;           // emission of the former, at least

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 
 #include "tests/unit/scene/built_scene.h"
@@ -153,6 +154,24 @@ TEST(Opacity, ALeafOfTwoColoursHasTheirMean) {
   };
   EXPECT_EQ(at(20.0F), glm::vec3(1.0F, 0.0F, 0.0F));
   EXPECT_EQ(at(21.0F), glm::vec3(0.0F, 0.0F, 1.0F));
+}
+
+// Cells that a triangle touches without their middles have the tint of the next; cells of tints are counted from the
+// first coloured pane on, those of opacity from the first cut-out.
+TEST(Opacity, APaneBehindACutOutHasItsOwnCells) {
+  auto scene = veiledFloor(AlphaMode::kMask, 64, 1, std::vector<std::uint8_t>(64, 255));
+  Primitive triangle = floorQuad(1.0);
+  triangle.indices = {0, 1, 2};
+  Material glass;
+  glass.base_color = {0.2F, 0.8F, 0.4F};
+  glass.transmission = 1.0F;
+  place(scene, triangle, glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 1.0, 0.0)), glass);
+  const auto patches = build(scene, 256);
+  const auto pane = std::ranges::find_if(patches.surfaces, [](const Surface& s) { return s.first_tint != kNone; });
+  ASSERT_NE(pane, patches.surfaces.end());
+  EXPECT_LT(pane->first_tint_cell, pane->first_opacity);
+  EXPECT_EQ(patches.tints.size(), std::size_t{pane->width} * pane->height * pane->opacity_scale * pane->opacity_scale);
+  for (const auto& tint : patches.leaf_tints) EXPECT_LT(glm::distance(tint, glm::vec3(0.25F, 1.0F, 0.5F)), 1e-3F);
 }
 
 TEST(Opacity, TransmissionHasItsTextureAtThePlace) {
