@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/scene/shading/shade.h"
+#include "tests/accuracy/stress/glass_scenes.h"
 #include "tests/accuracy/stress/leaves.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/glb_writer.h"
@@ -250,74 +251,32 @@ TEST(Mirrors, AnEditOfRoughnessCastsOnlyRaysThatMetIt) {
   EXPECT_EQ(edited.solver().irradiance(), before) << "what came back is what was";
 }
 
-Material glass(bool is_double_sided) {
-  Material material{"glass", glm::dvec3(1.0), {}};
-  material.transmission = 1.0;
-  material.roughness = 0.0;
-  material.double_sided = is_double_sided;
-  return material;
-}
+Material clearGlass(bool is_double_sided) { return glassOf(glm::dvec3(1.0), is_double_sided); }
 
 // Clear glass passes what it does not reflect: what sees the same light all around sees it in and through glass, too.
 class Glass : public testing::TestWithParam<bool> {};
 
 TEST_P(Glass, ThatIsClearLeavesAFurnaceAsItIs) {
-  Solve solve(load(furnaceWith(glass(GetParam())), 2400), settingsOf(0.005));
+  Solve solve(load(furnaceWith(clearGlass(GetParam())), 2400), settingsOf(0.005));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   EXPECT_LT(std::abs(compareToConstant(solve, 2.0 * std::numbers::pi).mean), 0.002) << "half the target of the solve";
 }
 
-/// What a face reflects at an angle, as told without the code under test.
-double reflectanceAt(double cosine) { return 0.04 + 0.96 * std::pow(1.0 - cosine, 5.0); }
-
-/// A black floor right below a face of glass as wide, so that the glass shows nothing but the floor, in a room all of
-/// whose walls shine with one nit, or under a light from far away.
-TestScene floorBelow(const Material& material, bool has_walls) {
-  TestScene scene;
-  scene.name = "floor_below_glass";
-  const auto black = scene.add({"black", glm::dvec3(0.0), {}});
-  const auto shines = scene.add({"shines", glm::dvec3(0.0), glm::dvec3(1.0)});
-  const auto clear = scene.add(material);
-  Object room{"room", {}, {}}, floor{"floor", {}, {}}, pane{"pane", {}, {}};
-  appendBox(room, glm::dvec3(-3.0), glm::dvec3(3.0), test_scenes::allFaces(shines), test_scenes::kNoFace, true);
-  const auto square = [](double y) {
-    return std::vector<glm::dvec3>{{-2.5, y, 2.5}, {2.5, y, 2.5}, {2.5, y, -2.5}, {-2.5, y, -2.5}};
-  };
-  floor.polygons = {{square(0.0), black}};
-  pane.polygons = {{square(0.02), clear}};
-  if (has_walls) scene.objects.push_back(room);
-  scene.objects.push_back(floor);
-  scene.objects.push_back(pane);
-  return scene;
-}
-
-/// By area, of the floor far from its edges.
-double meanOnFloor(const Solve& solve) {
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (const auto& leaf : wholeLeaves(solve)) {
-    if (std::max(std::abs(leaf.middle.x), std::abs(leaf.middle.z)) > 1.5 || std::abs(leaf.middle.y) > 0.01) continue;
-    sum += leaf.light.x;
-    ++count;
-  }
-  EXPECT_GT(count, 50U);
-  return sum / static_cast<double>(count);
-}
-
 TEST_P(Glass, PassesOfLightFromAllAroundWhatFresnelLeaves) {
-  Solve solve(loadGlb(test_scenes::encodeGlb(floorBelow(glass(GetParam()), true)), texelsOf(0.25)), settingsOf(0.005));
+  Solve solve(loadGlb(test_scenes::encodeGlb(floorBelow({clearGlass(GetParam())}, true)), texelsOf(0.25)),
+              settingsOf(0.005));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
   constexpr int kSteps = 4000;
   double passes = 0.0;
   for (int i = 0; i < kSteps; ++i) passes += (1.0 - reflectanceAt(std::sqrt((i + 0.5) / kSteps))) / kSteps;
-  EXPECT_NEAR(meanOnFloor(solve) / (std::numbers::pi * passes), 1.0, 0.005) << "the target of the solve";
+  EXPECT_NEAR(meanOnFloor(solve).x / (std::numbers::pi * passes), 1.0, 0.005) << "the target of the solve";
 }
 
 TEST_P(Glass, PassesOfLightFromFarAwayWhatFresnelLeavesAtItsAngle) {
   for (const double angle : {0.0, 1.2}) {
-    auto scene = floorBelow(glass(GetParam()), false);
+    auto scene = floorBelow({clearGlass(GetParam())}, false);
     test_scenes::Light sun;
     sun.kind = test_scenes::Light::Kind::kDirectional;
     sun.target = {std::sin(angle), -std::cos(angle), 0.0};
@@ -326,27 +285,12 @@ TEST_P(Glass, PassesOfLightFromFarAwayWhatFresnelLeavesAtItsAngle) {
     Solve solve(loadGlb(test_scenes::encodeGlb(scene), texelsOf(0.25)), settingsOf(0.005));
     (void)solve.run();  // a black floor reflects nothing, so that there may be nothing left to refine
     const double cosine = std::cos(angle), truth = 100.0 * cosine * (1.0 - reflectanceAt(cosine));
-    EXPECT_NEAR(meanOnFloor(solve) / truth, 1.0, 0.015) << angle << ": 150 leaves, by chance each time they look";
+    EXPECT_NEAR(meanOnFloor(solve).x / truth, 1.0, 0.015) << angle << ": 150 leaves, by chance each time they look";
   }
 }
 
-/// A lamp in a bulb of glass, in a closed room.
-TestScene roomWithBulb(const Material& material) {
-  TestScene scene;
-  scene.name = "bulb";
-  const auto white = scene.add({"white", glm::dvec3(0.7), {}});
-  const auto light = scene.add({"light", glm::dvec3(0.0), glm::dvec3(20.0)});
-  const auto clear = scene.add(material);
-  Object room{"room", {}, {}}, bulb{"bulb", {}, {}}, lamp{"lamp", {}, {}};
-  appendBox(room, {0, 0, 0}, {2, 2, 2}, test_scenes::allFaces(white), test_scenes::kNoFace, true);
-  appendSphere(bulb, {1.0, 1.2, 1.0}, 0.3, 2, clear, false);
-  appendBox(lamp, {0.9, 1.1, 0.9}, {1.1, 1.3, 1.1}, test_scenes::allFaces(light));
-  scene.objects = {room, bulb, lamp};
-  return scene;
-}
-
 TEST_P(Glass, ThatIsABulbLetsItsLampLightTheRoom) {
-  const auto scene = roomWithBulb(glass(GetParam()));
+  const auto scene = roomWithBulb(clearGlass(GetParam()));
   Solve solve(load(scene, 4000), settingsOf(0.01));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
