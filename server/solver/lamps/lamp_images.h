@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "server/solver/lamps/lamp_ball.h"
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/patches/lights.h"
 #include "server/solver/rays/flat_mirrors.h"
@@ -90,21 +91,13 @@ class LampImages {
   [[nodiscard]] Unhidden unhidden(std::uint32_t lamp, const LeafRays::Place& place, const glm::dvec3& shading,
                                   const glm::dvec2& at) const;
   [[nodiscard]] static LeafRays::Place behind(const FlatMirrors::Plane& plane, const LeafRays::Place& place);
-  /// Around a lamp; of one that is far, a way towards it.
-  struct Ball {
-    glm::dvec3 centre{0.0};
-    double radius = 0.0;
-    bool is_far = false;
-  };
-  [[nodiscard]] static Ball ballOf(const LightPolygon& lamp);
-  [[nodiscard]] static Ball ballOf(const PunctualLights::Source& source);
 
   std::shared_ptr<const LeafRays> rays_;
   std::shared_ptr<const SpecularLeaves> mirrors_;
   std::shared_ptr<const FlatMirrors> flat_;
   std::vector<LightPolygon> polygons_;
   std::vector<PunctualLights::Source> sources_;
-  std::vector<Ball> balls_;  ///< by lamp
+  std::vector<LampBall> balls_;  ///< by lamp
   std::vector<Image> images_;
 };
 

@@ -70,37 +70,19 @@ bool LightTints::Seen::differs() const {
 }
 
 LightTints::Sender LightTints::of(const LightPolygon& lamp) {
-  const auto ball = lamp.ball();
-  return {lamp.key, glm::dvec3(ball), static_cast<double>(ball.w), false,
-          [lamp](const LeafRays::Place& place, const glm::dvec2& at) {
+  return {lamp.key, ballOf(lamp), [lamp](const LeafRays::Place& place, const glm::dvec2& at) {
             return lookAtPoint(place, glm::dvec3(lamp.point(at.x, at.y)), glm::dvec3(lamp.normal));
           }};
 }
 
 LightTints::Sender LightTints::of(const PunctualLights::Source& source) {
-  using Kind = PunctualLights::Source::Kind;
-  Sender sender;
-  sender.key = mixKeys(source.shapeKey(), 1);
-  if (source.kind == Kind::kDirectional) {
-    sender.centre = glm::dvec3(source.direction);
-    sender.is_far = true;
-  } else if (source.kind == Kind::kLamp && source.shape.isFar()) {
-    const bool is_sky = source.shape.kind == LampShape::Kind::kSky;
-    sender.centre = glm::dvec3(is_sky ? glm::vec3(0.0F) : source.shape.axis);
-    sender.radius = is_sky ? HUGE_VAL : static_cast<double>(source.shape.half.x);
-    sender.is_far = true;
-  } else if (source.kind == Kind::kLamp) {
-    sender.centre = glm::dvec3(source.shape.centre);
-    sender.radius = static_cast<double>(source.shape.reach());
-  } else {
-    sender.centre = glm::dvec3(source.position);
-  }
-  sender.look = [source](const LeafRays::Place& place, const glm::dvec2& at) { return lookAt(source, place, at); };
-  return sender;
+  return {mixKeys(source.shapeKey(), 1), ballOf(source),
+          [source](const LeafRays::Place& place, const glm::dvec2& at) { return lookAt(source, place, at); }};
 }
 
 LightTints::Sender LightTints::of(const Crowd& crowd) {
-  return {mixKeys(crowd.key, 2), glm::dvec3(0.0), HUGE_VAL, false,
+  return {mixKeys(crowd.key, 2),
+          {glm::dvec3(0.0), HUGE_VAL, false},
           [lamps = crowd.lamps](const LeafRays::Place& place, const glm::dvec2& at) {
             // As light arrives at the place: a lamp near by counts for more than all others.
             const auto drawn = lamps->draw(LeafRays::startOf(place), glm::vec3(place.normal), at.x);
@@ -132,8 +114,9 @@ LightTints::Sender LightTints::of(const Side& side, const NodePlace& node, std::
     }
   }
   const auto key = mixKeys(mixKeys(side.key, 3), mixKeys(node.level, std::uint64_t{node.x} << 32U | node.y));
-  if (leaves.empty()) return {key, glm::dvec3(0.0), 0.0, false, [](const auto&, const auto&) { return SourceLook{}; }};
-  return {key, 0.5 * (low + high), 0.5 * glm::distance(low, high), false,
+  if (leaves.empty()) return {key, {}, [](const auto&, const auto&) { return SourceLook{}; }};
+  return {key,
+          {0.5 * (low + high), 0.5 * glm::distance(low, high), false},
           [leaves = std::move(leaves), rays = std::move(rays)](const LeafRays::Place& place, const glm::dvec2& at) {
             const double along = at.x * static_cast<double>(leaves.size());
             const auto& leaf = leaves[std::min(leaves.size() - 1, static_cast<std::size_t>(along))];
@@ -154,9 +137,10 @@ LightTints::LightTints(const scene::PatchScene& patches, const std::vector<Side>
 
 /// Whether a way from the ball to the sender meets the box of something coloured.
 bool LightTints::mayTint(const Sender& sender, const glm::dvec3& centre, double radius) const {
-  if (!std::isfinite(sender.radius)) return true;
-  const auto way = sender.is_far ? kFar * sender.centre : sender.centre - centre;
-  const glm::dvec3 half(radius + (sender.is_far ? kFar : 1.0) * sender.radius);
+  const auto& ball = sender.ball;
+  if (!std::isfinite(ball.radius)) return true;
+  const auto way = ball.is_far ? kFar * ball.centre : ball.centre - centre;
+  const glm::dvec3 half(radius + (ball.is_far ? kFar : 1.0) * ball.radius);
   return std::ranges::any_of(boxes_, [&](const auto& box) { return scene::sweeps(centre, half, way, 1.0, box); });
 }
 

@@ -16,6 +16,7 @@
 
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/lamps/crowd.h"
+#include "server/solver/lamps/lamp_ball.h"
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/lamps/unhidden.h"
 #include "server/solver/patches/lights.h"
@@ -29,10 +30,8 @@ class LightTints {
  public:
   /// What sends light over links.
   struct Sender {
-    std::uint64_t key = 0;   ///< stays while nothing but the colour of its light changes
-    glm::dvec3 centre{0.0};  ///< of a ball around it; of what is far, the way towards it
-    double radius = 0.0;
-    bool is_far = false;
+    std::uint64_t key = 0;  ///< stays while nothing but the colour of its light changes
+    LampBall ball;
     /// One of its points, uniform in [0, 1)^2, and what that brings to a place; only ratios count.
     std::function<SourceLook(const LeafRays::Place&, const glm::dvec2&)> look;
   };
