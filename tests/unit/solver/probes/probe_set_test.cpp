@@ -122,7 +122,7 @@ TEST_F(Probes, UnderASkyHaveTheHarmonicsOfAHemisphere) {
   for (std::size_t h = 0; h < kHarmonics; ++h)
     EXPECT_NEAR(found.light[h].x, expected[h], 4.0 * found.error[h].x + 1e-3 * expected[0]) << h;
   EXPECT_LT(found.error[0].x, 0.03 * expected[0]);
-  EXPECT_GT(found.error[0].x, 0.0);
+  EXPECT_GT(found.error[1].x, 0.0) << "that of band 0 may be 0: just half of the rays of each round go up";
 }
 
 TEST_F(Probes, RightOverALitFloorHaveItsRadianceFromBelow) {
@@ -130,8 +130,9 @@ TEST_F(Probes, RightOverALitFloorHaveItsRadianceFromBelow) {
   irradiance_.assign(scene_.patches->nodeCount(), glm::vec3(80.0F));
   const auto found = at({0.0, -0.3999, 0.0});
   const double radiance = 0.5 * 80.0 / pi;
-  EXPECT_NEAR(found.light[0].x, 2.0 * pi * 0.2820948 * radiance, 4.0 * found.error[0].x);
-  EXPECT_NEAR(found.light[1].x, -pi * 0.4886025 * radiance, 4.0 * found.error[1].x);
+  EXPECT_NEAR(found.light[0].x, 2.0 * pi * 0.2820948 * radiance,
+              4.0 * found.error[0].x + 1e-5 * radiance);  // single precision
+  EXPECT_NEAR(found.light[1].x, -pi * 0.4886025 * radiance, 4.0 * found.error[1].x + 1e-5 * radiance);
   EXPECT_LT(found.error[0].x, 0.03 * found.light[0].x);
 }
 
