@@ -27,7 +27,7 @@ using std::numbers::pi;
 constexpr std::size_t kCount = 9;
 using Harmonics = std::array<glm::dvec3, kCount>;
 
-std::array<double, kCount> basis(const glm::dvec3& d) {
+std::array<double, kCount> harmonicBasis(const glm::dvec3& d) {
   const double k0 = std::sqrt(0.25 / pi), k1 = std::sqrt(0.75 / pi), k2 = std::sqrt(3.75 / pi);
   return {k0,
           k1 * d.y,
@@ -79,7 +79,7 @@ std::vector<Truth> traced(const oracle::TriangleScene& scene, const std::vector<
     auto& truth = truths.emplace_back();
     for (std::size_t n = 0; n < rule.size(); ++n) {
       const auto& irradiance = found[p * rule.size() + n];
-      const auto harmonics = basis(rule[n].normal);
+      const auto harmonics = harmonicBasis(rule[n].normal);
       for (std::size_t h = 0; h < kCount; ++h) {
         const double of_band = h == 0 ? pi : h < 4 ? 2.0 * pi / 3.0 : pi / 4.0;
         const double weight = rule[n].weight * harmonics[h] / of_band;
@@ -91,7 +91,7 @@ std::vector<Truth> traced(const oracle::TriangleScene& scene, const std::vector<
   return truths;
 }
 
-fs::path sceneFileOf(const std::string& name) {
+fs::path probedSceneFileOf(const std::string& name) {
   const auto built = fs::path(RADIOSITY_BINARY_DIR) / "scenes" / (name + ".glb");
   return fs::exists(built) ? built : fs::path(RADIOSITY_SHARED_DIR) / "scenes" / (name + ".glb");
 }
@@ -141,7 +141,7 @@ class SolvedProbes : public testing::TestWithParam<Case> {};
 
 TEST_P(SolvedProbes, HaveTheLightOfThePathTracerAndTellTheirErrorTruly) {
   const auto& test = GetParam();
-  const auto file = sceneFileOf(test.scene);
+  const auto file = probedSceneFileOf(test.scene);
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / ("SolvedProbes." + test.scene);
   fs::create_directories(folder);

@@ -41,7 +41,7 @@ TEST_F(ProbeGrids, OfASceneWithoutAnyAreNotFound) {
 TEST_F(ProbeGrids, ThatPatchesBringHaveLightAndChangeNone) {
   solve(blockRoom());
   const auto before = light();
-  const auto added = add("[1, 1, 1]");
+  const auto added = add("[1, 1.2, 1]");
   ASSERT_TRUE(added) << added.error().text();
   EXPECT_EQ(added->affected_surfaces, 0U);
   EXPECT_EQ(added->affected_shots, 0U);
