@@ -22,10 +22,9 @@ struct ProbeList {
   std::string_view name;
   std::size_t count = 0;
 };
-inline constexpr std::array kProbeLists = {ProbeList{"light", 27},   ProbeList{"standardError", 27},
-                                           ProbeList{"distance", 6}, ProbeList{"distanceSquared", 6},
-                                           ProbeList{"nearest", 1},  ProbeList{"backs", 1},
-                                           ProbeList{"ring", 1}};
+inline constexpr std::array kProbeLists = {
+    ProbeList{"light", 27},  ProbeList{"standardError", 27}, ProbeList{"distance", 6}, ProbeList{"distanceSquared", 6},
+    ProbeList{"nearest", 1}, ProbeList{"backs", 1},          ProbeList{"ring", 1}};
 inline constexpr std::size_t kProbeNumbers = 69;  ///< of all lists
 
 struct ProbeGrid {

@@ -102,20 +102,19 @@ Result<std::string> saveProbes(const Remote& remote, const ProbeOptions& options
 std::string probesText(const protocol::Probes& probes) {
   std::string text;
   for (const auto& grid : probes.grids) {
-    const auto name = !grid.node            ? std::string("the whole scene")
-                      : grid.name.empty()   ? fmt::format("node {}", *grid.node)
-                                            : oneLine(grid.name);
-    text += fmt::format("{}: {} x {} x {} probes, {:.3g} x {:.3g} x {:.3g} m apart\n", name, grid.counts[0],
-                        grid.counts[1], grid.counts[2], lengthOf(grid.steps[0]), lengthOf(grid.steps[1]),
-                        lengthOf(grid.steps[2]));
+    const auto name = !grid.node          ? std::string("the whole scene")
+                      : grid.name.empty() ? fmt::format("node {}", *grid.node)
+                                          : oneLine(grid.name);
+    text +=
+        fmt::format("{}: {} x {} x {} probes, {:.3g} x {:.3g} x {:.3g} m apart\n", name, grid.counts[0], grid.counts[1],
+                    grid.counts[2], lengthOf(grid.steps[0]), lengthOf(grid.steps[1]), lengthOf(grid.steps[2]));
   }
   return text;
 }
 
 void addProbes(CLI::App& app, Run& run) {
   auto options = std::make_shared<CommandOptions>();
-  auto& command =
-      *app.add_subcommand("probes", "save the light at grids of probes of a server's scene as it is now");
+  auto& command = *app.add_subcommand("probes", "save the light at grids of probes of a server's scene as it is now");
   addRemoteOptions(command, options->server);
   addProbeOptions(command, options->probes, "--spacing", "-o,--output");
   command.get_option("--output")->required();

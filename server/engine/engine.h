@@ -343,14 +343,14 @@ struct ProbeGridLight {
   std::optional<std::uint32_t> node;  ///< none: the whole scene
   std::string name;
   std::array<std::uint32_t, 3> counts{1, 1, 1};
-  glm::dvec3 first{0.0};                 ///< metres
-  std::array<glm::dvec3, 3> steps{};     ///< to the next in x, y and z, metres
-  std::vector<float> values;             ///< kProbeValues of each probe, one probe after the other; or none
+  glm::dvec3 first{0.0};              ///< metres
+  std::array<glm::dvec3, 3> steps{};  ///< to the next in x, y and z, metres
+  std::vector<float> values;          ///< kProbeValues of each probe, one probe after the other; or none
 };
 /// Of a probe: nine coefficients of radiance, three channels each, nits x sr; their standard errors; distances to the
 /// nearest surface about +X, -X, +Y, -Y, +Z, -Z, metres, and their mean squares; the least distance; the part of all
-/// directions in which backs are met; 0, or, where the light is that of others, how many probes away they are (-1: there
-/// are none).
+/// directions in which backs are met; 0, or, where the light is that of others, how many probes away they are (-1:
+/// there are none).
 inline constexpr std::size_t kProbeValues = 2 * 27 + 2 * 6 + 3;
 
 /// The probes of a moment.

@@ -52,8 +52,7 @@ Result<void> requireInside(const scene::ProbeGrid& grid, const Box& scene, doubl
   if (glm::any(glm::lessThan(box.high, scene.low)) || glm::any(glm::greaterThan(box.low, scene.high)))
     return fail(ErrorCode::kInvalidScene, "lies outside of " + reaches, where);
   const glm::dvec3 beyond(kMostBeyond * widest);
-  if (glm::any(glm::lessThan(box.low, scene.low - beyond)) ||
-      glm::any(glm::greaterThan(box.high, scene.high + beyond)))
+  if (glm::any(glm::lessThan(box.low, scene.low - beyond)) || glm::any(glm::greaterThan(box.high, scene.high + beyond)))
     return fail(ErrorCode::kInvalidScene, "reaches farther beyond its walls than it is wide: " + reaches, where);
   return {};
 }

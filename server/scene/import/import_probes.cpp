@@ -44,7 +44,8 @@ class ProbeGridList {
   Result<ProbeGrid> read(const PlacedNode& node, const std::string& pointer) const {
     const auto& json = *node.extras;
     if (!json.is_object()) return bad(pointer, "must be an object with size and spacing");
-    if (const auto ok = requireOnePlace(document_.name, node, pointer, "a grid"); !ok) return tl::unexpected(ok.error());
+    if (const auto ok = requireOnePlace(document_.name, node, pointer, "a grid"); !ok)
+      return tl::unexpected(ok.error());
     const auto *size = memberOf(json, "size"), *spacing = memberOf(json, "spacing");
     if (size == nullptr || !size->is_array() || size->size() != 3 || !std::ranges::all_of(*size, isLength))
       return bad(pointer + "/size", "must be three numbers of metres above 0, at most 1e6");

@@ -10,8 +10,8 @@
 namespace radiosity::scene {
 
 /// Of the nodes that the document shows and that are visible, in the order of the node tree; those of hidden nodes are
-/// checked alone. A grid is a box around its node's origin, along its axes. `document`: its nodes are checked, as import
-/// does. Errors name the member. O(nodes), little where there are no grids.
+/// checked alone. A grid is a box around its node's origin, along its axes. `document`: its nodes are checked, as
+/// import does. Errors name the member. O(nodes), little where there are no grids.
 [[nodiscard]] Result<std::vector<ProbeGrid>> readProbeGrids(const Document& document);
 
 }  // namespace radiosity::scene

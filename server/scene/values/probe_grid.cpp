@@ -37,9 +37,8 @@ Result<void> divide(ProbeGrid& grid, double spacing, std::uint64_t others) {
   const auto most = static_cast<double>(kMostProbes - std::min(kMostProbes, others));
   if (const double cells = cellsOf(grid, spacing); !(cells <= most)) {
     const auto rest = others > 0 ? fmt::format(", beside the {} of other grids", others) : std::string();
-    const auto advice = most >= 1.0
-                            ? fmt::format("; a spacing of {:.2g} m would do", leastSpacing(grid, spacing, most))
-                            : std::string();
+    const auto advice = most >= 1.0 ? fmt::format("; a spacing of {:.2g} m would do", leastSpacing(grid, spacing, most))
+                                    : std::string();
     return fail(ErrorCode::kTooLarge,
                 fmt::format("a spacing of {:.4g} m makes {:.3g} probes{}, and there may be {} in all{}", spacing, cells,
                             rest, kMostProbes, advice));

@@ -33,8 +33,8 @@ struct ProbeGrid {
   bool operator==(const ProbeGrid&) const = default;
 };
 
-/// Divides the sides of a grid into as few cells as are no wider than `spacing` (metres, above 0). kTooLarge, which says
-/// how many probes that makes, and which spacing would do, where these and `others` are more than kMostProbes.
+/// Divides the sides of a grid into as few cells as are no wider than `spacing` (metres, above 0). kTooLarge, which
+/// says how many probes that makes, and which spacing would do, where these and `others` are more than kMostProbes.
 [[nodiscard]] Result<void> divide(ProbeGrid& grid, double spacing, std::uint64_t others);
 
 }  // namespace radiosity::scene

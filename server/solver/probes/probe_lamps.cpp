@@ -28,8 +28,7 @@ class Emitters {
   [[nodiscard]] bool isPolygon(std::uint32_t index) const { return index < lamps_.size(); }
   [[nodiscard]] const LightPolygon& polygon(std::uint32_t index) const { return lamps_[index]; }
   [[nodiscard]] LampGlimpse glimpseOf(std::uint32_t index, const glm::dvec3& place, const glm::dvec2& at) const {
-    return isPolygon(index) ? glimpse(lamps_[index], place, at)
-                            : glimpse(sources_[index - lamps_.size()], place, at);
+    return isPolygon(index) ? glimpse(lamps_[index], place, at) : glimpse(sources_[index - lamps_.size()], place, at);
   }
   [[nodiscard]] std::uint64_t keyOfEmitter(std::uint32_t index) const {
     return isPolygon(index) ? lamps_[index].key : mixKeys(sources_[index - lamps_.size()].shapeKey(), 1);
@@ -126,8 +125,8 @@ void addSome(const Looker& from, std::span<const ProbeEmitter> lamps, std::uint3
       const double chance = (up_to[number] - (number > 0 ? up_to[number - 1] : 0.0)) / all;
       const auto seen = from.emitters.glimpseOf(lamps[number].index, from.place, {draw.x, draw.y});
       if (!(seen.weight > 0.0 && chance > 0.0)) continue;
-      const auto light = seen.weight / (chance * count) * from.passageTo(seen, mixKeys(of_round, k)) *
-                         lamps[number].light;
+      const auto light =
+          seen.weight / (chance * count) * from.passageTo(seen, mixKeys(of_round, k)) * lamps[number].light;
       const auto harmonics = harmonicsOf(seen.way);
       for (std::size_t h = 0; h < kHarmonics; ++h) sums[r][h] += harmonics[h] * light;
     }

@@ -27,8 +27,7 @@ glm::dvec3 onSphere(double u, double v) {
 std::uint32_t packed(const glm::dvec3& direction) {
   const auto on = direction / (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
   glm::dvec2 at(on.x, on.y);
-  if (on.z < 0.0)
-    at = {std::copysign(1.0 - std::abs(on.y), on.x), std::copysign(1.0 - std::abs(on.x), on.y)};
+  if (on.z < 0.0) at = {std::copysign(1.0 - std::abs(on.y), on.x), std::copysign(1.0 - std::abs(on.x), on.y)};
   return glm::packSnorm2x16(glm::vec2(at));
 }
 
@@ -159,9 +158,8 @@ void ProbeRays::traceRound(const PlaceLight& light, const glm::dvec3& place, std
       RayEnd at{LeafRays::kNothing, {}, direction[i], mixKeys(key, order[first + i].number)};
       glm::dvec3 tint(1.0);
       at.value = light.tinted().see(from[i], at.direction, at.key, at.end, tint, &hit[i]);
-      const auto distance = LeafRays::isSky(at.value)
-                                ? ProbeSight::kFarthest
-                                : static_cast<float>(glm::distance(at.end.position, place));
+      const auto distance =
+          LeafRays::isSky(at.value) ? ProbeSight::kFarthest : static_cast<float>(glm::distance(at.end.position, place));
       sight.nearest = std::min(sight.nearest, distance);
       sight.backs += light.rays().isBack(at.value, at.end, at.direction) ? 1.0F : 0.0F;
       part.lobes.add(direction[i], static_cast<double>(distance));

@@ -111,8 +111,7 @@ std::vector<Probe> readProbes(const fs::path& file, std::size_t most) {
   for (std::size_t i = 0; i < counts[0] * counts[1] * counts[2]; ++i) {
     if (grid.at("ring").at(i) != 0) continue;
     auto& probe = all.emplace_back();
-    const std::array<double, 3> cell{static_cast<double>(i % counts[0]),
-                                     static_cast<double>(i / counts[0] % counts[1]),
+    const std::array<double, 3> cell{static_cast<double>(i % counts[0]), static_cast<double>(i / counts[0] % counts[1]),
                                      static_cast<double>(i / counts[0] / counts[1])};
     probe.place = triple(grid.at("first"));
     for (std::size_t axis = 0; axis < 3; ++axis) probe.place += cell[axis] * triple(grid.at("steps").at(axis));
@@ -180,8 +179,7 @@ TEST_P(SolvedProbes, HaveTheLightOfThePathTracerAndTellTheirErrorTruly) {
   EXPECT_LT(ratio, 1.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SolvedProbes,
-                         testing::Values(Case{"cornell", "0.25"}, Case{"room_small", "0.8"}),
+INSTANTIATE_TEST_SUITE_P(Scenes, SolvedProbes, testing::Values(Case{"cornell", "0.25"}, Case{"room_small", "0.8"}),
                          [](const auto& info) { return info.param.scene; });
 
 }  // namespace

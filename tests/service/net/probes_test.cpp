@@ -49,7 +49,8 @@ TEST(LightProbes, WithoutLightArePlacesAlone) {
 
 TEST(LightProbes, AskedForWronglyAreRefusedByTheirPlace) {
   RunningServer server;
-  for (const char* wrong : {"spacing=0", "spacing=-1", "spacing=1e7", "spacing=nan", "spacing=1m", "spacing=", "light=1"}) {
+  for (const char* wrong :
+       {"spacing=0", "spacing=-1", "spacing=1e7", "spacing=nan", "spacing=1m", "spacing=", "light=1"}) {
     const auto got = request(server.port(), "GET", std::string("/probes.json?") + wrong);
     EXPECT_EQ(got.status, 400) << wrong;
     const std::string where = wrong[0] == 'l' ? "?light=" : "?spacing=";

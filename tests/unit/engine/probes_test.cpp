@@ -118,7 +118,8 @@ TEST_F(ProbeGrids, OfTooManyProbesOrOutsideTheSceneAreRefused) {
   ASSERT_FALSE(outside);
   EXPECT_EQ(outside.error().code, ErrorCode::kInvalidScene);
   EXPECT_THAT(outside.error().where, HasSubstr("/extras/radiosityProbes"));
-  EXPECT_THAT(outside.error().message, HasSubstr("lies outside of the scene, which reaches from (0, 0, 0) to (2, 2, 2)"));
+  EXPECT_THAT(outside.error().message,
+              HasSubstr("lies outside of the scene, which reaches from (0, 0, 0) to (2, 2, 2)"));
   EXPECT_FALSE(add("[1, 1, 1]", "0.0001"));
 }
 

@@ -35,8 +35,8 @@ ProbeGrid importedGrid(const GltfBuilder& builder) {
 }
 
 TEST(ProbeGrids, AreBoxesAroundTheirNodeWithProbesInTheMiddleOfCells) {
-  const auto grid = importedGrid(withProbes({{"size", {2.0, 1.0, 3.0}}, {"spacing", 0.8}},
-                                            {{"name", "room"}, {"translation", {1, 0.5, 2}}}));
+  const auto grid = importedGrid(
+      withProbes({{"size", {2.0, 1.0, 3.0}}, {"spacing", 0.8}}, {{"name", "room"}, {"translation", {1, 0.5, 2}}}));
   EXPECT_EQ(grid.name, "room");
   EXPECT_EQ(grid.node, 0U);
   EXPECT_EQ(grid.counts, (std::array<std::uint32_t, 3>{3, 2, 4}));
@@ -61,8 +61,8 @@ TEST(ProbeGrids, OfHiddenNodesAreCheckedAlone) {
   const Json hidden{{"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}};
   const auto builder = withProbes({{"size", {1, 1, 1}}, {"spacing", 0.5}}, hidden);
   EXPECT_TRUE(readProbeGrids(*builder.document())->empty());
-  expectRefused(withProbes({{"size", {1, 1, 1}}}, hidden), ErrorCode::kInvalidScene,
-                kProbesPointer + "/spacing", "must be a number of metres");
+  expectRefused(withProbes({{"size", {1, 1, 1}}}, hidden), ErrorCode::kInvalidScene, kProbesPointer + "/spacing",
+                "must be a number of metres");
 }
 
 TEST(ProbeGrids, ThatAreWrongAreRefusedByTheirPlace) {
