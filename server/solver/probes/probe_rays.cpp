@@ -31,14 +31,49 @@ std::uint32_t packed(const glm::dvec3& direction) {
   return glm::packSnorm2x16(glm::vec2(at));
 }
 
-glm::vec3 unpacked(std::uint32_t bits) {
+/// Rays whose light is summed up together, so that loops over them vectorise.
+constexpr std::size_t kLanes = 8;
+using Lanes = std::array<float, kLanes>;
+
+std::array<Lanes, 3> unpacked(const std::array<std::uint32_t, kLanes>& bits) {
   constexpr float kUnit = 1.0F / 32767.0F;
-  const float x = kUnit * static_cast<float>(static_cast<std::int16_t>(bits & 0xffffU));
-  const float y = kUnit * static_cast<float>(static_cast<std::int16_t>(bits >> 16U));
-  const float z = 1.0F - std::abs(x) - std::abs(y), fold = std::max(0.0F, -z);
-  const glm::vec3 way(x - std::copysign(fold, x), y - std::copysign(fold, y), z);
-  return way / std::sqrt(glm::dot(way, way));
+  std::array<Lanes, 3> ways;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const float x = kUnit * static_cast<float>(static_cast<std::int32_t>(bits[i] << 16U) >> 16);
+    const float y = kUnit * static_cast<float>(static_cast<std::int32_t>(bits[i]) >> 16);
+    const float z = 1.0F - std::abs(x) - std::abs(y), fold = z < 0.0F ? -z : 0.0F;
+    const float fx = x < 0.0F ? x + fold : x - fold, fy = y < 0.0F ? y + fold : y - fold;
+    const float scale = 1.0F / std::sqrt(fx * fx + fy * fy + z * z);
+    ways[0][i] = scale * fx;
+    ways[1][i] = scale * fy;
+    ways[2][i] = scale * z;
+  }
+  return ways;
 }
+
+/// Harmonics of what some rays bring, by channel; the fourth: what that is off by.
+class HarmonicLanes {
+ public:
+  void add(const std::array<Lanes, 3>& ways, const std::array<Lanes, 4>& light) {
+    std::array<Lanes, kHarmonics> harmonics;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const auto of = harmonicsOf<float>(ways[0][i], ways[1][i], ways[2][i]);
+      for (std::size_t h = 0; h < kHarmonics; ++h) harmonics[h][i] = of[h];
+    }
+    for (std::size_t h = 0; h < kHarmonics; ++h)
+      for (std::size_t c = 0; c < 4; ++c)
+        for (std::size_t i = 0; i < kLanes; ++i) sums_[h][c][i] += harmonics[h][i] * light[c][i];
+  }
+  [[nodiscard]] glm::dvec4 sum(std::size_t h) const {
+    glm::dvec4 sum(0.0);
+    for (int c = 0; c < 4; ++c)
+      for (const float of : sums_[h][static_cast<std::size_t>(c)]) sum[c] += static_cast<double>(of);
+    return sum;
+  }
+
+ private:
+  std::array<std::array<Lanes, 4>, kHarmonics> sums_{};
+};
 
 /// What rays remember: a leaf, a lamp that a mirror shows there, or a cell of the sky.
 class Sources {
@@ -191,23 +226,37 @@ ProbeRays::Radiance ProbeRays::radianceOf(const PlaceLight& light) {
   return radiance;
 }
 
+/// Of a round of a probe, by number: sums over its rays; lanes that have none bring nothing.
+std::array<glm::dvec4, kHarmonics> ProbeRays::gatherRound(std::size_t number, const Radiance& radiance) const {
+  HarmonicLanes lanes;
+  const auto end = first_[number + 1];
+  for (auto first = first_[number]; first < end; first += kLanes) {
+    std::array<std::uint32_t, kLanes> direction{};
+    std::array<Lanes, 4> light{};
+    const auto together = std::min<std::uint64_t>(kLanes, end - first);
+    for (std::size_t i = 0; i < together; ++i) {
+      direction[i] = direction_[first + i];
+      auto of_ray = radiance[from_[first + i]];
+      if (!part_.empty()) of_ray *= glm::vec4(part_[first + i], 1.0F);
+      for (int c = 0; c < 4; ++c) light[static_cast<std::size_t>(c)][i] = of_ray[c];
+    }
+    lanes.add(unpacked(direction), light);
+  }
+  std::array<glm::dvec4, kHarmonics> sums;
+  for (std::size_t h = 0; h < kHarmonics; ++h) sums[h] = lanes.sum(h);
+  return sums;
+}
+
 ProbeSums ProbeRays::gather(std::size_t probe, const Radiance& radiance) const {
   std::array<glm::dvec3, kHarmonics> sum{}, squares{};
   std::array<double, kHarmonics> off{};
   for (std::uint32_t round = 0; round < kRounds; ++round) {
-    std::array<glm::vec4, kHarmonics> of_round{};
-    const auto end = first_[probe * kRounds + round + 1];
-    for (auto i = first_[probe * kRounds + round]; i < end; ++i) {
-      const auto way = unpacked(direction_[i]);
-      const auto harmonics = harmonicsOf<float>(way.x, way.y, way.z);
-      const auto light = part_.empty() ? radiance[from_[i]] : radiance[from_[i]] * glm::vec4(part_[i], 1.0F);
-      for (std::size_t h = 0; h < kHarmonics; ++h) of_round[h] += harmonics[h] * light;
-    }
+    const auto of_round = gatherRound(probe * kRounds + round, radiance);
     for (std::size_t h = 0; h < kHarmonics; ++h) {
       const glm::dvec3 light(of_round[h]);
       sum[h] += light;
       squares[h] += light * light;
-      off[h] += static_cast<double>(of_round[h].w);
+      off[h] += of_round[h].w;
     }
   }
   ProbeSums sums;

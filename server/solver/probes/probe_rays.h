@@ -65,6 +65,7 @@ class ProbeRays {
   void trace(const PlaceLight& light, const glm::dvec3& place, std::uint64_t key, Part& part) const;
   void traceRound(const PlaceLight& light, const glm::dvec3& place, std::uint64_t key, Part& part,
                   ProbeSight& sight) const;
+  [[nodiscard]] std::array<glm::dvec4, kHarmonics> gatherRound(std::size_t number, const Radiance& radiance) const;
   void keep(std::vector<Part> parts);
   [[nodiscard]] static std::uint64_t mirrorKeyOf(const PlaceLight& light);
 
