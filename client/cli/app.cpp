@@ -24,6 +24,7 @@ void buildApp(CLI::App& app, Run& run) {
   addStatus(app, run);
   addTexel(app, run);
   addMeasure(app, run);
+  addProbes(app, run);
   addSnapshot(app, run);
   addSave(app, run);
 }

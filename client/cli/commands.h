@@ -22,6 +22,7 @@ void addScript(CLI::App& app, Run& run);
 void addStatus(CLI::App& app, Run& run);
 void addTexel(CLI::App& app, Run& run);
 void addMeasure(CLI::App& app, Run& run);
+void addProbes(CLI::App& app, Run& run);
 void addSnapshot(CLI::App& app, Run& run);
 void addSave(CLI::App& app, Run& run);
 

@@ -12,6 +12,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/ktx2.h"
 #include "client/cli/measure.h"
+#include "client/cli/probes.h"
 #include "client/cli/remote.h"
 #include "client/cli/report.h"
 #include "client/cli/scene_file.h"
@@ -35,6 +36,7 @@ constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets
 struct SolveOptions {
   std::string scene, output, report, png;  ///< output: empty where nothing but planes is asked for
   MeasureOptions measure;
+  ProbeOptions probes;
   SkyOptions sky;
   std::string state;  ///< folder; empty: an interrupted solve is lost
   RemoteOptions server;
@@ -86,6 +88,8 @@ class Solve {
     if (auto loaded = load(*connection); !loaded) return complainOf(loaded.error());
     if (options_.measure.wanted)
       if (auto ready = requirePlanes(remote_, options_.measure); !ready) return complainOf(ready.error());
+    if (!options_.probes.output.empty())
+      if (auto ready = requireProbes(remote_, options_.probes); !ready) return complainOf(CallFailure{ready.error()});
     auto status = waitForEnd(*connection);
     if (!status) return complainOf(status.error());
     return finish(*connection, *std::move(status));
@@ -95,6 +99,7 @@ class Solve {
     auto sky = skyChoice(options_.sky);
     if (!sky) return tl::unexpected(sky.error());
     sky_ = std::move(*sky);
+    if (auto ready = checkProbes(options_.probes); !ready) return ready;
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
     if (!options_.output.empty())
@@ -277,6 +282,9 @@ class Solve {
     auto measured = options_.measure.wanted ? measurePlanes(remote_, options_.measure, display_) : std::string();
     if (!measured) return complainOf(CallFailure{measured.error()});
     std::fputs(measured->c_str(), stdout);
+    auto probes = options_.probes.output.empty() ? std::string() : saveProbes(remote_, options_.probes, display_);
+    if (!probes) return complainOf(CallFailure{probes.error()});
+    std::fputs(probes->c_str(), stdout);
     const auto& failure = status.progress.failure;
     const std::string why =
         status.progress.state == "limited" ? "limited (" + oneLine(failure) + "): " : "time limit: ";
@@ -338,6 +346,7 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
       ->type_name("");
   command.add_option("--measure", options.measure.csv, "also the points of the scene's measuring planes, as CSV")
       ->type_name("FILE");
+  addProbeOptions(command, options.probes, "--probes", "--probes-out");
   command
       .add_option("-o,--output", options.output,
                   "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")

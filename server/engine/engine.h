@@ -333,6 +333,34 @@ struct MeasureReport {
   std::vector<MeasuredPlane> planes;
 };
 
+struct ProbeRequest {
+  std::optional<double> spacing;  ///< metres: one grid over the whole scene; none: the grids of the document
+  bool light = true;              ///< false: where probes are, without what they see
+};
+
+/// A grid of probes: (x, y, z) is number x + counts[0] (y + counts[1] z).
+struct ProbeGridLight {
+  std::optional<std::uint32_t> node;  ///< none: the whole scene
+  std::string name;
+  std::array<std::uint32_t, 3> counts{1, 1, 1};
+  glm::dvec3 first{0.0};              ///< metres
+  std::array<glm::dvec3, 3> steps{};  ///< to the next in x, y and z, metres
+  std::vector<float> values;          ///< kProbeValues of each probe, one probe after the other; or none
+};
+/// Of a probe: nine coefficients of radiance, three channels each, nits x sr; their standard errors; distances to the
+/// nearest surface about +X, -X, +Y, -Y, +Z, -Z, metres, and their mean squares; the least distance; the part of all
+/// directions in which backs are met; 0, or, where the light is that of others, how many probes away they are (-1:
+/// there are none).
+inline constexpr std::size_t kProbeValues = 2 * 27 + 2 * 6 + 3;
+
+/// The probes of a moment.
+struct ProbeReport {
+  std::uint64_t revision = 0;
+  SolveState state = SolveState::kEmpty;
+  double error = 1.0;  ///< ErrorEstimate::total
+  std::vector<ProbeGridLight> grids;
+};
+
 /// The photometric web of a light of EXT_lights_ies, with few enough directions to be drawn.
 struct ShownWeb {
   std::uint64_t revision = 0;
@@ -440,6 +468,10 @@ class Engine {
   virtual void measure(MeasureRequest /*request*/, Client /*client*/, Callback<MeasureReport> done) {
     done(MeasureReport{});
   }
+
+  /// Light at grids of probes, as pictures are made: what they see is found once, and only summed up again while the
+  /// geometry stays. kNotFound: the document has no grid. kTooLarge, and Error::where is "spacing": too many probes.
+  virtual void probes(ProbeRequest /*request*/, Client /*client*/, Callback<ProbeReport> done) { done(ProbeReport{}); }
 
   /// The same from the engine's start to its end.
   [[nodiscard]] virtual const Past& past() const {

@@ -229,6 +229,23 @@ protocol::Planes toPlanes(const engine::MeasureReport& report) {
   return out;
 }
 
+protocol::Probes toProbes(engine::ProbeReport report) {
+  static_assert(protocol::kProbeNumbers == engine::kProbeValues);
+  protocol::Probes out{report.revision, std::string(stateName(report.state)), finite(report.error, 1e9), {}};
+  for (auto& grid : report.grids) {
+    auto& to = out.grids.emplace_back();
+    to.node = grid.node;
+    to.name = std::move(grid.name);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      to.counts[axis] = grid.counts[axis];
+      to.steps[axis] = triple(grid.steps[axis]);
+    }
+    to.first = triple(grid.first);
+    to.values = std::move(grid.values);
+  }
+  return out;
+}
+
 protocol::Web toWeb(const engine::ShownWeb& web) {
   return {web.revision,       web.lumens, web.most_candela, triple(web.axis),
           triple(web.across), web.polar,  web.azimuth,      web.candela};

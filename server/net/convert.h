@@ -5,6 +5,7 @@
 
 #include "protocol/light_web.h"
 #include "protocol/messages.h"
+#include "protocol/probes.h"
 #include "server/engine/engine.h"
 
 namespace radiosity::net {
@@ -18,6 +19,7 @@ namespace radiosity::net {
 [[nodiscard]] protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& history);
 [[nodiscard]] protocol::TexelReply toTexelReply(const engine::Texel& texel);
 [[nodiscard]] protocol::Planes toPlanes(const engine::MeasureReport& report);
+[[nodiscard]] protocol::Probes toProbes(engine::ProbeReport report);
 [[nodiscard]] protocol::Web toWeb(const engine::ShownWeb& web);
 /// What a message has room for.
 [[nodiscard]] protocol::Planes withoutLongGrids(protocol::Planes planes);

@@ -247,6 +247,50 @@ void getPlanesCsv(const std::shared_ptr<Hub>& hub, HttpRequest& request, const R
   measure(hub, request, done, "text/csv; charset=utf-8", &protocol::planesCsv);
 }
 
+Result<engine::ProbeRequest> queryProbes(const HttpRequest& request) {
+  engine::ProbeRequest wanted;
+  const auto light = queryText(request, "light", "true");
+  if (light != "true" && light != "false") return fail(ErrorCode::kBadInput, "must be true or false", "?light=");
+  wanted.light = light == "true";
+  const auto found = request.query.find("spacing");
+  if (found == request.query.end()) return wanted;
+  double value = 0.0;
+  const auto& text = found->second;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0.0 && value <= protocol::kMaxProbeSpacing))
+    return fail(ErrorCode::kBadInput, "must be a number of metres above 0, at most 1e6", "?spacing=");
+  wanted.spacing = value;
+  return wanted;
+}
+
+/// `write` makes the body.
+void tellProbes(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done, std::string_view type,
+                std::string (*write)(const protocol::Probes&)) {
+  const auto wanted = queryProbes(request);
+  if (!wanted) return done(errorResponse(wanted.error()));
+  const auto encode = [write](Result<engine::ProbeReport> report) -> Result<SharedBytes> {
+    if (report) {
+      const auto text = write(toProbes(std::move(*report)));
+      return std::make_shared<const Bytes>(text.begin(), text.end());
+    }
+    auto error = report.error();
+    if (error.where == "spacing") error.where = "?spacing=";
+    return tl::unexpected<Error>(std::move(error));
+  };
+  hub->engine().probes(*wanted, clientOf(request),
+                       hub->fromEngineMade<engine::ProbeReport>(encode, [done, type](const Result<SharedBytes>& bytes) {
+                         done(bytes ? file(*bytes, type) : errorResponse(bytes.error()));
+                       }));
+}
+
+void getProbesJson(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  tellProbes(hub, request, done, "application/json", &protocol::encodeHttpProbes);
+}
+
+void getProbesBinary(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  tellProbes(hub, request, done, "application/octet-stream", &protocol::probesBinary);
+}
+
 void getHealth(const std::shared_ptr<Hub>& /*hub*/, HttpRequest& /*request*/, const Respond& done) {
   done(plain(200, "ok\n"));
 }
@@ -300,6 +344,8 @@ constexpr std::array kRoutes = {
     Route{"/snapshots/", "GET", getStoredSnapshot},
     Route{"/planes.json", "GET", getPlanesJson},
     Route{"/planes.csv", "GET", getPlanesCsv},
+    Route{"/probes.json", "GET", getProbesJson},
+    Route{"/probes.bin", "GET", getProbesBinary},
     Route{"/healthz", "GET", getHealth, true},
     Route{"/readyz", "GET", getReady, true},
     Route{"/metrics", "GET", getMetrics},

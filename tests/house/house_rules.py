@@ -60,6 +60,7 @@ OWN_INCLUDES = [
         "variation": "edits lamps math patches rays reflected",
         "surface": "lamps math patches rays",
         "planes": "math patches rays surface",
+        "probes": "lamps math patches rays surface",
     }, SOLVER),
     *among("solver", {
         "shooting": "error math patches transport",

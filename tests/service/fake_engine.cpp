@@ -453,6 +453,21 @@ void FakeEngine::measure(engine::MeasureRequest request, engine::Client /*client
   });
 }
 
+void FakeEngine::probes(engine::ProbeRequest request, engine::Client /*client*/, Callback<engine::ProbeReport> done) {
+  const auto now = status();
+  answer([done, request, now] {
+    const double spacing = request.spacing.value_or(1.0);
+    if (spacing < 1e-3) return done(fail(ErrorCode::kTooLarge, "too many probes", "spacing"));
+    engine::ProbeGridLight grid;
+    if (!request.spacing) grid.node = 4;
+    grid.counts = {2, 1, 1};
+    grid.steps = {glm::dvec3(spacing, 0, 0), glm::dvec3(0, spacing, 0), glm::dvec3(0, 0, spacing)};
+    for (std::size_t i = 0; request.light && i < 2 * engine::kProbeValues; ++i)
+      grid.values.push_back(static_cast<float>(i));
+    done(engine::ProbeReport{now.revision, now.state, 0.01, {grid}});
+  });
+}
+
 void FakeEngine::addListener(std::weak_ptr<engine::Listener> listener) {
   const std::lock_guard lock(mutex_);
   listeners_.push_back(std::move(listener));

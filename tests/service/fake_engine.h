@@ -78,6 +78,7 @@ class FakeEngine : public engine::Engine {
   /// There is one, of light 2.
   void lightWeb(std::size_t light, engine::Client client, Callback<engine::ShownWeb> done) override;
   void measure(engine::MeasureRequest request, engine::Client client, Callback<engine::MeasureReport> done) override;
+  void probes(engine::ProbeRequest request, engine::Client client, Callback<engine::ProbeReport> done) override;
   void callOff() override { called_off_ = true; }
   void addListener(std::weak_ptr<engine::Listener> listener) override;
 

@@ -10,6 +10,7 @@
 #include "server/engine/publish/framing.h"
 #include "server/engine/publish/picture.h"
 #include "server/engine/publish/plane_report.h"
+#include "server/engine/publish/probe_report.h"
 #include "server/engine/publish/quantity_pages.h"
 #include "server/engine/publish/sky_file.h"
 #include "server/scene/import/light_web_of.h"
@@ -164,6 +165,22 @@ void SolveLoop::measure(MeasureRequest request, Client client, Callback<MeasureR
     });
     if (!parts) return tl::unexpected<Error>(parts.error());
     report.planes = measurePlanes(*parts, request);
+    return report;
+  });
+}
+
+void SolveLoop::probes(ProbeRequest request, Client client, Callback<ProbeReport> done) {
+  askLong<ProbeReport>(client, std::move(done), [this, request]() -> Result<ProbeReport> {
+    ProbeReport report;
+    const auto parts = fromSolveThread([this, request, &report]() -> Result<ProbeParts> {
+      const auto& lit = coarser_ && !lit_->showsOwnLight() ? *coarser_ : *lit_;
+      report.revision = revision_;
+      report.state = state_;
+      report.error = lit.showsOwnLight() ? lit.shownError() : lit.solver().error().total;
+      return readProbes(lit, request);
+    });
+    if (!parts) return tl::unexpected(parts.error());
+    report.grids = request.light ? probes_.light(*parts) : ProbeKeeper::places(*parts);
     return report;
   });
 }

@@ -35,6 +35,7 @@
 #include "server/engine/loop/watches.h"
 #include "server/engine/persist/history.h"
 #include "server/engine/publish/error_history.h"
+#include "server/engine/publish/probe_report.h"
 #include "server/engine/publish/publisher.h"
 #include "server/engine/publish/texel_reader.h"
 #include "server/gpu/picture/view_renderer.h"
@@ -83,6 +84,7 @@ class SolveLoop final : public Engine {
   void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) override;
   void texel(TexelRequest request, Callback<Texel> done) override;
   void measure(MeasureRequest request, Client client, Callback<MeasureReport> done) override;
+  void probes(ProbeRequest request, Client client, Callback<ProbeReport> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
   [[nodiscard]] const Past& past() const override { return past_; }
   void callOff() override;
@@ -290,6 +292,7 @@ class SolveLoop final : public Engine {
 
   // thread of long work only
   std::unique_ptr<gpu::ViewRenderer> view_;
+  ProbeKeeper probes_;
   std::weak_ptr<const Bytes> glb_;                    ///< the last that was made, while it is being sent
   std::pair<std::uint64_t, std::uint64_t> glb_of_{};  ///< its layout and revision
 

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/mat4x4.hpp>
 #include <string>
 #include <utility>
 
 #include "server/scene/document/json_text.h"
-#include "server/scene/import/import_instancing.h"
-#include "server/scene/import/node_transform.h"
+#include "server/scene/import/placed_nodes.h"
 
 namespace radiosity::scene {
 namespace {
@@ -21,43 +19,23 @@ constexpr double kMostAskedLux = 1e9;
 /// Of the cosine between the sides of a rectangle.
 constexpr double kSquare = 1e-3;
 
-/// A node of the tree, where it stands.
-struct Place {
-  std::size_t index = 0;
-  glm::dmat4 world{1.0};
-  bool visible = true;
-  bool animated = false;  ///< it, or a node above it, is moved by an animation
-};
-
-const Json* planeOf(const Json& node) {
-  const auto* extras = memberOf(node, "extras");
-  return extras != nullptr ? memberOf(*extras, kMember) : nullptr;
-}
-
 std::string pointerOf(std::size_t node) { return "/nodes/" + std::to_string(node) + "/extras/" + kMember; }
 
 class PlaneReader {
  public:
-  PlaneReader(const std::string& document, const Json& json, const Place& node, std::uint64_t other_points)
+  PlaneReader(const std::string& document, const PlacedNode& node, std::uint64_t other_points)
       : document_(document),
-        json_(json),
         node_(node),
-        plane_(*planeOf(json)),
+        plane_(*node.extras),
         pointer_(pointerOf(node.index)),
         other_points_(other_points) {}
 
   Result<MeasuringPlane> read() {
     if (!plane_.is_object()) return bad(pointer_, "must be an object with width and depth");
-    if (extensionOf(json_, "EXT_mesh_gpu_instancing") != nullptr)
-      return bad(pointer_, "must not be on a node with EXT_mesh_gpu_instancing: a plane lies in one place");
-    if (node_.animated)
-      return bad(pointer_,
-                 "must not be on a node that an animation moves, or below one: animations are not "
-                 "played, and a plane lies in one place");
+    if (const auto ok = requireOnePlace(document_, node_, pointer_, "a plane"); !ok) return tl::unexpected(ok.error());
     MeasuringPlane made;
     made.node = static_cast<std::uint32_t>(node_.index);
-    const auto* name = memberOf(json_, "name");
-    if (name != nullptr && name->is_string()) made.name = name->get<std::string>();
+    made.name = node_.name;
     if (auto ok = readPlace(made); !ok) return tl::unexpected(ok.error());
     if (auto ok = readGrid(made); !ok) return tl::unexpected(ok.error());
     if (auto ok = readTarget(made.target); !ok) return tl::unexpected(ok.error());
@@ -146,99 +124,20 @@ class PlaneReader {
   }
 
   const std::string& document_;
-  const Json& json_;
-  const Place& node_;
+  const PlacedNode& node_;
   const Json& plane_;
   std::string pointer_;
   std::uint64_t other_points_;
 };
 
-/// By node: whether a channel of an animation moves it. Empty: there are no animations.
-std::vector<bool> animatedNodes(const Json& gltf) {
-  const auto* animations = memberOf(gltf, "animations");
-  const auto* nodes = memberOf(gltf, "nodes");
-  if (animations == nullptr || !animations->is_array() || nodes == nullptr || !nodes->is_array()) return {};
-  std::vector<bool> animated(nodes->size(), false);
-  for (const auto& animation : *animations) {
-    const auto* channels = memberOf(animation, "channels");
-    if (channels == nullptr || !channels->is_array()) continue;
-    for (const auto& channel : *channels) {
-      const auto* target = memberOf(channel, "target");
-      const auto* node = target != nullptr ? memberOf(*target, "node") : nullptr;
-      if (node == nullptr || !node->is_number_integer() || *node < 0) continue;
-      if (const auto index = node->get<std::uint64_t>(); index < animated.size()) animated[index] = true;
-    }
-  }
-  return animated;
-}
-
-glm::dmat4 localMatrix(const Json& node) {
-  const auto numbers = [&](const char* member, auto otherwise) {
-    const auto* json = memberOf(node, member);
-    if (json != nullptr)
-      for (int i = 0; i < otherwise.length(); ++i) otherwise[i] = (*json)[static_cast<std::size_t>(i)].get<double>();
-    return otherwise;
-  };
-  if (const auto* matrix = memberOf(node, "matrix")) {
-    glm::dmat4 m(1.0);
-    for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = (*matrix)[static_cast<std::size_t>(i)].get<double>();
-    return m;
-  }
-  const auto turn = numbers("rotation", glm::dvec4(0.0, 0.0, 0.0, 1.0));
-  return Trs{numbers("translation", glm::dvec3(0.0)), glm::normalize(glm::dquat(turn.w, turn.x, turn.y, turn.z)),
-             numbers("scale", glm::dvec3(1.0))}
-      .matrix();
-}
-
-class PlaneWalk {
+/// Reads the planes of the nodes that have one.
+class PlaneList {
  public:
-  explicit PlaneWalk(const Document& document)
-      : document_(document), nodes_(document.gltf.at("nodes")), animated_(animatedNodes(document.gltf)) {}
+  explicit PlaneList(const Document& document) : document_(document) {}
 
-  Result<std::vector<MeasuringPlane>> run() {
-    const auto roots = rootNodes();
-    for (auto root = roots.rbegin(); root != roots.rend(); ++root) stack_.push_back({*root});
-    while (!stack_.empty()) {
-      auto node = stack_.back();
-      stack_.pop_back();
-      const auto& json = nodes_[node.index];
-      const auto* visibility = extensionOf(json, "KHR_node_visibility");
-      node.world = node.world * localMatrix(json);
-      node.visible = node.visible && (visibility == nullptr || visibility->value("visible", true));
-      node.animated = node.animated || (!animated_.empty() && animated_[node.index]);
-      if (planeOf(json) != nullptr)
-        if (auto ok = take(json, node); !ok) return tl::unexpected(ok.error());
-      const auto below = childrenOf(json);
-      for (auto child = below.rbegin(); child != below.rend(); ++child)
-        stack_.push_back({*child, node.world, node.visible, node.animated});
-    }
-    return std::move(planes_);
-  }
-
- private:
-  [[nodiscard]] static std::vector<std::size_t> childrenOf(const Json& json, const char* member = "children") {
-    const auto* children = memberOf(json, member);
-    return children != nullptr ? children->get<std::vector<std::size_t>>() : std::vector<std::size_t>();
-  }
-
-  /// Of the scene to show: /scene, else the first of /scenes, else every node without a parent.
-  [[nodiscard]] std::vector<std::size_t> rootNodes() const {
-    const auto* scenes = memberOf(document_.gltf, "scenes");
-    if (scenes != nullptr && !scenes->empty())
-      return childrenOf((*scenes)[document_.gltf.value("scene", std::size_t{0})], "nodes");
-    std::vector<bool> has_parent(nodes_.size(), false);
-    for (const auto& node : nodes_)
-      for (const auto child : childrenOf(node)) has_parent[child] = true;
-    std::vector<std::size_t> roots;
-    for (std::size_t n = 0; n < has_parent.size(); ++n)
-      if (!has_parent[n]) roots.push_back(n);
-    return roots;
-  }
-
-  Result<void> take(const Json& json, const Place& node) {
+  Result<void> take(const PlacedNode& node) {
     const auto where = place(document_.name, pointerOf(node.index));
-    if (!isFinite(node.world)) return fail(ErrorCode::kInvalidScene, "its world transform is not finite", where);
-    auto plane = PlaneReader(document_.name, json, node, points_).read();
+    auto plane = PlaneReader(document_.name, node, points_).read();
     if (!plane) return tl::unexpected(plane.error());
     if (!node.visible) return {};
     if (planes_.size() >= kMostPlanes)
@@ -248,11 +147,10 @@ class PlaneWalk {
     planes_.push_back(std::move(*plane));
     return {};
   }
+  [[nodiscard]] std::vector<MeasuringPlane> planes() && { return std::move(planes_); }
 
+ private:
   const Document& document_;
-  const Json& nodes_;
-  std::vector<bool> animated_;
-  std::vector<Place> stack_;
   std::vector<MeasuringPlane> planes_;
   std::uint64_t points_ = 0;
 };
@@ -260,10 +158,10 @@ class PlaneWalk {
 }  // namespace
 
 Result<std::vector<MeasuringPlane>> readPlanes(const Document& document) {
-  const auto* nodes = memberOf(document.gltf, "nodes");
-  const auto has_plane = [](const Json& node) { return planeOf(node) != nullptr; };
-  if (nodes == nullptr || std::none_of(nodes->begin(), nodes->end(), has_plane)) return std::vector<MeasuringPlane>();
-  return PlaneWalk(document).run();
+  PlaneList list(document);
+  const auto done = forEachPlacedNode(document, kMember, [&](const PlacedNode& node) { return list.take(node); });
+  if (!done) return tl::unexpected(done.error());
+  return std::move(list).planes();
 }
 
 }  // namespace radiosity::scene

@@ -12,6 +12,7 @@
 #include "server/scene/import/import_model.h"
 #include "server/scene/import/import_nodes.h"
 #include "server/scene/import/import_planes.h"
+#include "server/scene/import/import_probes.h"
 #include "server/scene/import/import_record.h"
 #include "server/scene/import/scene_memory.h"
 
@@ -39,6 +40,7 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
                         record.images, scene,  record.webs,   record.skies};
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
   if (const auto planes = readPlanes(document); !planes) return tl::unexpected(planes.error());
+  if (const auto probes = readProbeGrids(document); !probes) return tl::unexpected(probes.error());
   const auto all = claimOfGeometry(document, *record.model, *claimed, limits);
   if (!all) return tl::unexpected(all.error());
   record.claimed_bytes = context.claimed_bytes = *all;

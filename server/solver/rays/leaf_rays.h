@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -81,6 +82,11 @@ class LeafRays {
   /// `first`: what the ray meets, of meetFirst(); null: that is looked for. `panes`: what it goes through is added.
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
                                   const geometry::Hit* first = nullptr, Panes* panes = nullptr) const;
+  /// Whether what see() told is the unlit back of a surface: inside solids rays meet nothing else.
+  [[nodiscard]] bool isBack(std::uint32_t value, const Place& end, const glm::dvec3& direction) const {
+    return value == kNothing && end.triangle != scene::kNone &&
+           glm::dot(glm::dvec3(patches_.triangles[end.triangle].normal), direction) > 0.0;
+  }
   /// What rays of see() meet first, geometry::kPacket of them at most: asked together they cost half.
   void meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
                  std::span<geometry::Hit> hits) const;

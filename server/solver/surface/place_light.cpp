@@ -9,11 +9,11 @@
 #include "common/parallel.h"
 #include "common/task.h"
 #include "server/solver/lamps/unhidden.h"
-#include "server/solver/math/microfacets.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/patches/unshot_pyramid.h"
 #include "server/solver/rays/ray_order.h"
+#include "server/solver/surface/mirror_walk.h"
 
 namespace radiosity::solver {
 namespace {
@@ -274,25 +274,15 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
 /// What a ray that met a mirror sees in it, beside the light of the mirror's own leaf. Lamps count in full there, since
 /// direct light does not come by way of mirrors, but for those that are looked for as images.
 glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
-  glm::dvec3 sum(0.0), part(1.0);
-  auto value = met.value;
-  auto end = met.end;
-  auto direction = met.direction;
-  auto key = met.key;
-  const auto isMirror = [&] { return mirrors_ && value < emission_.size() && mirrors_->has(value); };
-  for (std::size_t hop = 0; hop < SpecularLeaves::kMostHops && isMirror(); ++hop) {
-    key = mixKeys(key, 7 + hop);
-    const auto reflection = reflectByMicrofacets(end.normal, direction, mirrors_->roughness(value), key);
-    const bool is_imaged = hop == 0 && reflection.count == 1 && lamp_images_.isIn(value);
-    for (const double edge : reflection.edges())
-      part *= glm::dvec3(mirrors_->reflectance(value, static_cast<float>(edge)));
-    direction = reflection.direction;
-    const auto from = end;
-    value = tinted_.see(from, direction, key, end, part);
-    sum += part * leaving(value, end, key, met.steps);
-    if (value >= lamp_emission_.size() || (is_imaged && channelSum(lamp_emission_[value]) > least_imaged_)) continue;
-    sum += part * glm::dvec3(lamp_emission_[value]);
-  }
+  glm::dvec3 sum(0.0);
+  followMirrors(tinted_, mirrors_.get(), {met.value, met.end, met.direction, met.key},
+                [&](const RayEnd& at, const glm::dvec3& part, const MirrorHop& hop) {
+                  sum += part * leaving(at.value, at.end, at.key, met.steps);
+                  const bool is_imaged = hop.number == 0 && hop.bounces == 1 && lamp_images_.isIn(hop.mirror);
+                  if (at.value >= lamp_emission_.size()) return;
+                  if (is_imaged && channelSum(lamp_emission_[at.value]) > least_imaged_) return;
+                  sum += part * glm::dvec3(lamp_emission_[at.value]);
+                });
   return sum;
 }
 

@@ -81,6 +81,19 @@ class PlaceLight {
   /// By leaf value.
   [[nodiscard]] const std::vector<glm::vec3>& reflectance() const { return reflectance_; }
   [[nodiscard]] const std::vector<PassingLeaf>& passing() const { return passing_; }
+  /// lm/m^2, by leaf value, of all but lamps(); and what that is off by, one standard deviation of either sign: empty
+  /// where it is not known.
+  [[nodiscard]] const std::vector<glm::vec3>& radiosity() const { return radiosity_; }
+  [[nodiscard]] const std::vector<glm::vec3>& off() const { return off_; }
+  /// What lamps() shine with, likewise; empty: there are no mirrors that could show them.
+  [[nodiscard]] const std::vector<glm::vec3>& lampEmission() const { return lamp_emission_; }
+  /// Surfaces and sources that places look at; none of them is dark.
+  [[nodiscard]] std::span<const LightPolygon> lamps() const {
+    return many_ ? std::span<const LightPolygon>(many_->lights()) : std::span<const LightPolygon>(lamps_);
+  }
+  [[nodiscard]] const std::vector<PunctualLights::Source>& sources() const { return sources_; }
+  [[nodiscard]] const SpecularLeaves* mirrors() const { return mirrors_.get(); }
+  [[nodiscard]] const TintedRays& tinted() const { return tinted_; }
 
   [[nodiscard]] const std::vector<Side>& sides() const { return *sides_; }
   [[nodiscard]] const LeafRays& rays() const { return *rays_; }
