@@ -1,0 +1,44 @@
+#include "client/engines/engine.h"
+
+#include <algorithm>
+
+namespace radiosity::engines {
+
+const std::vector<Engine>& allEngines() {
+  constexpr std::string_view kServe = "npm install && npm start";
+  static const std::vector<Engine> kEngines = {
+      {"three", "three.js", Encoding::kHalfExr, false, kServe},
+      {"babylon", "Babylon.js", Encoding::kPlainHalfExr, false, kServe},
+      {"playcanvas", "PlayCanvas", Encoding::kHalfDds, false, kServe},
+      {"blender", "Blender", Encoding::kHalfExr, false, "blender scene.blend"},
+      {"hubs", "Hubs", Encoding::kRgbe, true, "upload scene.glb"},
+  };
+  return kEngines;
+}
+
+const Engine* findEngine(std::string_view name) {
+  const auto& all = allEngines();
+  const auto found = std::ranges::find(all, name, &Engine::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> engineNames() {
+  std::vector<std::string> names;
+  for (const auto& engine : allEngines()) names.emplace_back(engine.name);
+  return names;
+}
+
+std::string_view encodingText(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::kHalfExr:
+    case Encoding::kPlainHalfExr:
+      return "half-float EXR";
+    case Encoding::kHalfDds:
+      return "half-float DDS";
+    case Encoding::kRgbe:
+      return "RGBE";
+  }
+  return "";
+}
+
+}  // namespace radiosity::engines
