@@ -35,14 +35,14 @@ Result<engines::LitScene> downloadLit(const Remote& remote, const EngineRequest&
   return scene;
 }
 
-/// The line of a program's output that tells what went wrong, or its last one.
+/// The line of a Python program's output that tells what went wrong ("ValueError: ..."), or its last one.
 std::string complaintIn(const std::string& text) {
   std::istringstream lines(text);
   std::string line, last, complaint;
   while (std::getline(lines, line)) {
     if (line.find_first_not_of(" \t") == std::string::npos) continue;
     last = line;
-    if (line.find("Error") != std::string::npos) complaint = line;
+    if (line.find("Error: ") != std::string::npos && !line.starts_with("Error: ")) complaint = line;
   }
   return complaint.empty() ? last : complaint;
 }

@@ -12,9 +12,14 @@ import math
 from pathlib import Path
 
 import bpy
+import numpy
 from mathutils import Vector
 
 FOLDER = Path(__file__).resolve().parent
+
+# The importer of Blender 3.4 names numpy.bool, which the numpy of Debian 12 no longer has.
+if "bool" not in vars(numpy):
+    numpy.bool = bool
 
 
 class LitMaterial:
