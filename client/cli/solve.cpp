@@ -34,8 +34,8 @@ constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps st
 constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png;  ///< output: empty where nothing but planes is asked for
-  std::string engine;                      ///< that output is a folder for; empty: none
+  std::string scene, output, report, png,
+      engine;  ///< output: empty for planes alone; a folder where there is an engine
   MeasureOptions measure;
   SkyOptions sky;
   std::string state;  ///< folder; empty: an interrupted solve is lost
@@ -100,10 +100,11 @@ class Solve {
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
     const bool is_folder = !options_.engine.empty();
-    if (!options_.output.empty() && !is_folder)
-      if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
-    if (is_folder)
-      if (auto ready = checkEngineFolder(options_.output); !ready) return ready;
+    if (!options_.output.empty()) {
+      const auto ready =
+          is_folder ? checkEngineFolder(options_.output) : glbStem(options_.output).map([](const auto&) {});
+      if (!ready) return ready;
+    }
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
@@ -368,8 +369,7 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
 }
 
 /// How to solve, and where.
-void addSolvingOptions(CLI::App& app, SolveOptions& of) {
-  auto& command = app;
+void addSolvingOptions(CLI::App& command, SolveOptions& of) {
   auto* options = &of;
   command
       .add_option(

@@ -21,7 +21,6 @@ namespace radiosity::engines {
 namespace {
 
 using HalfPixel = std::array<half, 4>;  // R, G, B, 1
-using RgbePixel = std::array<std::uint8_t, 4>;
 
 /// OpenEXR writes into a growing buffer.
 class MemoryStream : public Imf::OStream {
@@ -114,43 +113,6 @@ Bytes writeDds(const Image& page, const std::vector<HalfPixel>& halves) {
   return bytes;
 }
 
-constexpr int kExponentBias = 128, kMantissaBits = 8;
-
-/// Ward, "Real Pixels", Graphics Gems II, 1991; mantissas are rounded, where Ward's cut off.
-RgbePixel toRgbe(const glm::vec3& value) {
-  const float largest = std::max({value.r, value.g, value.b});
-  if (largest < 1e-32F) return {0, 0, 0, 0};
-  int exponent = 0;
-  (void)std::frexp(largest, &exponent);
-  if (std::lround(std::ldexp(largest, kMantissaBits - exponent)) > 255) ++exponent;
-  const auto mantissa = [&](float v) {
-    return static_cast<std::uint8_t>(std::lround(std::ldexp(v, kMantissaBits - exponent)));
-  };
-  return {mantissa(value.r), mantissa(value.g), mantissa(value.b), static_cast<std::uint8_t>(exponent + kExponentBias)};
-}
-
-glm::vec3 fromRgbe(const RgbePixel& pixel) {
-  if (pixel[3] == 0) return glm::vec3(0.0F);
-  const float step = std::ldexp(1.0F, pixel[3] - kExponentBias - kMantissaBits);
-  return glm::vec3(pixel[0], pixel[1], pixel[2]) * step;
-}
-
-/// Pixels one after the other, not run-length encoded: all readers take that, and the light has few runs.
-Bytes writeRgbe(const Image& page, EncodedPage& into) {
-  const std::string head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y " + std::to_string(page.height) + " +X " +
-                           std::to_string(page.width) + "\n";
-  Bytes bytes(head.begin(), head.end());
-  bytes.reserve(head.size() + page.pixels.size() * sizeof(RgbePixel));
-  const auto scale = static_cast<float>(1.0 / into.unit);
-  for (const auto& pixel : page.pixels) {
-    const auto value = sane(pixel);
-    const auto stored = toRgbe(value * scale);
-    bytes.insert(bytes.end(), stored.begin(), stored.end());
-    count(into, value, fromRgbe(stored));
-  }
-  return bytes;
-}
-
 }  // namespace
 
 double unitFor(float largest) {
@@ -169,10 +131,6 @@ Result<EncodedPage> encodePage(const Image& page, Encoding encoding, double unit
     largest = std::max({largest, value.r, value.g, value.b});
   }
   encoded.unit = unit > 0.0 ? unit : unitFor(largest);
-  if (encoding == Encoding::kRgbe) {
-    encoded.bytes = writeRgbe(page, encoded);
-    return encoded;
-  }
   const auto halves = toHalves(page, encoded);
   if (encoding == Encoding::kHalfDds) {
     encoded.bytes = writeDds(page, halves);

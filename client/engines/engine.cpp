@@ -7,11 +7,10 @@ namespace radiosity::engines {
 const std::vector<Engine>& allEngines() {
   constexpr std::string_view kServe = "npm install && npm start";
   static const std::vector<Engine> kEngines = {
-      {"three", "three.js", Encoding::kHalfExr, false, kServe},
-      {"babylon", "Babylon.js", Encoding::kPlainHalfExr, false, kServe},
-      {"playcanvas", "PlayCanvas", Encoding::kHalfDds, false, kServe},
-      {"blender", "Blender", Encoding::kHalfExr, false, "blender scene.blend"},
-      {"hubs", "Hubs", Encoding::kRgbe, true, "upload scene.glb"},
+      {"three", "three.js", Encoding::kHalfExr, kServe},
+      {"babylon", "Babylon.js", Encoding::kPlainHalfExr, kServe},
+      {"playcanvas", "PlayCanvas", Encoding::kHalfDds, kServe},
+      {"blender", "Blender", Encoding::kHalfExr, "blender scene.blend"},
   };
   return kEngines;
 }
@@ -35,8 +34,6 @@ std::string_view encodingText(Encoding encoding) {
       return "half-float EXR";
     case Encoding::kHalfDds:
       return "half-float DDS";
-    case Encoding::kRgbe:
-      return "RGBE";
   }
   return "";
 }

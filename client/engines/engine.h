@@ -12,15 +12,13 @@ enum class Encoding {
   kHalfExr,       ///< OpenEXR, half floats, zip
   kPlainHalfExr,  ///< OpenEXR, half floats, not compressed
   kHalfDds,       ///< DirectDraw Surface, RGBA half floats
-  kRgbe,          ///< Radiance HDR, eight bits a channel and an exponent
 };
 
 struct Engine {
   std::string_view name;   ///< as options have it
   std::string_view title;  ///< as its makers write it
   Encoding encoding = Encoding::kHalfExr;
-  bool holds_pages = false;  ///< the pages are images of scene.glb, not files beside it
-  std::string_view next;     ///< what to do with the folder, for the user
+  std::string_view next;  ///< what to do with the folder, for the user
 };
 
 [[nodiscard]] const std::vector<Engine>& allEngines();

@@ -9,7 +9,6 @@
 #include "client/engines/baked_scene.h"
 #include "client/engines/encode.h"
 #include "client/engines/engine_files.h"
-#include "client/engines/hubs.h"
 
 namespace radiosity::engines {
 namespace {
@@ -21,8 +20,6 @@ std::string_view endingOf(Encoding encoding) {
       return "exr";
     case Encoding::kHalfDds:
       return "dds";
-    case Encoding::kRgbe:
-      return "hdr";
   }
   return "";
 }
@@ -78,7 +75,6 @@ class Export {
 
  private:
   Result<void> addPages() {
-    HubsPages hubs(scene_.gltf, scene_.bin, exposureOf(scene_.pages));
     // PlayCanvas has no factor for a lightmap: all pages have one unit.
     const double unit = engine_.encoding == Encoding::kHalfDds ? unitFor(largestOf(scene_.pages)) : 0.0;
     for (std::size_t page = 0; page < scene_.pages.size(); ++page) {
@@ -90,13 +86,9 @@ class Export {
                     {"height", scene_.pages[page].height},
                     {"encoding", encodingText(engine_.encoding)},
                     {"luxOfOne", encoded->unit}};
-      if (engine_.holds_pages) {
-        hubs.add(page, *encoded);
-      } else {
-        auto name = "lightmap." + std::to_string(page) + "." + std::string(endingOf(engine_.encoding));
-        entry["file"] = name;
-        add(std::move(name), std::move(encoded->bytes));
-      }
+      auto name = "lightmap." + std::to_string(page) + "." + std::string(endingOf(engine_.encoding));
+      entry["file"] = name;
+      add(std::move(name), std::move(encoded->bytes));
       pages_.push_back(std::move(entry));
     }
     return {};

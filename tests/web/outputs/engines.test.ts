@@ -1,10 +1,13 @@
 // What `radiosity solve --for` writes shows in the engine what a path tracer says is there.
 
-import { readFileSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { existsSync, readFileSync } from 'node:fs';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { FloatType } from 'three';
+import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { Pages } from '../browser/harness';
 import { readGlb, withTexture } from './glb';
 import { compare, expectTheSame, fromBase64, HEIGHT, traced, WIDTH, type Difference } from './pictures';
@@ -136,5 +139,28 @@ describe.each(['three', 'babylon', 'playcanvas'])('%s', (engine) => {
     const named = Object.entries(versionsIn(join(shown, 'package.json')));
     expect(named.length).toBeGreaterThan(1);
     for (const [name, version] of named) expect(version, name).toBe(ours[name]);
+  });
+});
+
+describe.skipIf(!existsSync('/usr/bin/blender'))("blender (skipped: '/usr/bin/blender' is not there)", () => {
+  /** scene.blend as Cycles renders it: R, G, B of each pixel, rows from the top. */
+  function rendered(): Float32Array {
+    const script = fileURLToPath(new URL('draw/blender.py', import.meta.url));
+    const file = join(shown, 'out.exr');
+    const args = ['--background', join(shown, 'scene.blend'), '--python-exit-code', '1', '--python', script, '--'];
+    execFileSync('blender', [...args, file, String(WIDTH), String(HEIGHT)], { stdio: 'pipe' });
+    const bytes = readFileSync(file);
+    const { data } = new EXRLoader().setDataType(FloatType).parse(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length)); // prettier-ignore
+    return fromBase64(Buffer.from((data as Float32Array).buffer).toString('base64'));
+  }
+
+  it.each(['cornell', 'room_small_double', 'room_lights'])('%s', async (name) => {
+    const scene = join(SCENES, `${name}.glb`);
+    shown = join(out, `blender-${name}`);
+    await solve(scene, shown, ...QUALITY, '--for', 'blender');
+    const truth = await (truths.get(name) ?? traced(scene, join(out, `${name}.f32`)));
+    const difference = compare(rendered(), truth);
+    console.log(`blender, ${name}: ratio ${difference.ratio.toFixed(4)}, RMS ${difference.rms.toFixed(4)}, worst ${difference.worst.toFixed(3)}`); // prettier-ignore
+    expectTheSame(difference);
   });
 });

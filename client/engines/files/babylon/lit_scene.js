@@ -32,12 +32,16 @@ function makeIrradianceLightmap(B) {
 
 function loadLightmap(B, scene, { file, luxOfOne }, folder) {
   return new Promise((resolve, reject) => {
-    const settle = [() => resolve(texture), (message) => reject(new Error(message ?? `${file} cannot be loaded`))];
+    const loaded = () => {
+      texture.gammaSpace = false; // which the loader takes to be unknown
+      resolve(texture);
+    };
+    const settle = [loaded, (message) => reject(new Error(message ?? `${file} cannot be loaded`))];
     const url = new URL(file, folder).href;
     const texture = new B.Texture(url, scene, true, false, B.Texture.BILINEAR_SAMPLINGMODE, ...settle);
     texture.coordinatesIndex = 1; // TEXCOORD_1
+    [texture.vScale, texture.vOffset] = [-1, 1]; // Babylon's EXR loader has the last row first, and glTF's v runs down
     texture.wrapU = texture.wrapV = B.Texture.CLAMP_ADDRESSMODE;
-    texture.gammaSpace = false;
     texture.level = luxOfOne;
   });
 }

@@ -151,6 +151,18 @@ class LitMaterial:
         return node.outputs["Vector"]
 
 
+def part_sides():
+    """Front and back of a sheet are two meshes in one place, each seen from its own side. Cycles would miss one of them
+    behind the other's back, so that all are moved a little outwards."""
+    points = corners()
+    size = max((abs(value) for point in points for value in point), default=1.0)
+    for mesh in {thing.data for thing in bpy.context.scene.objects if thing.type == "MESH"}:
+        user = next(thing for thing in bpy.context.scene.objects if thing.data == mesh)
+        step = 1e-5 * size / max(max(user.matrix_world.to_scale()), 1e-12)
+        for vertex in mesh.vertices:
+            vertex.co += step * vertex.normal
+
+
 def load_page(page):
     image = bpy.data.images.load(str(FOLDER / page["file"]))
     image.colorspace_settings.name = "Non-Color"  # linear as it is
@@ -203,6 +215,7 @@ def main():
         if 0 <= page < len(images):
             LitMaterial(material, images[page], about["lightmaps"][page]["luxOfOne"]).light()
     bpy.context.view_layer.update()
+    part_sides()
     choose_camera()
     set_scene_up(about["exposure"])
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "scene.blend"), compress=True)

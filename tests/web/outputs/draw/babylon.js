@@ -21,6 +21,7 @@ window.draw = async (width, height) => {
   target.renderList = null; // all meshes
   scene.customRenderTargets.push(target);
   await scene.whenReadyAsync(true);
+  scene.render(); // which finds out what is to be drawn
   scene.render();
   const pixels = await target.readPixels();
   engine.dispose();
