@@ -34,8 +34,7 @@ constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps st
 constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png,
-      engine;  ///< output: empty for planes alone; a folder where there is an engine
+  std::string scene, output, report, png, engine;  ///< output: empty for planes alone; of an engine: a folder
   MeasureOptions measure;
   SkyOptions sky;
   std::string state;  ///< folder; empty: an interrupted solve is lost
