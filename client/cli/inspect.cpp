@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "client/cli/commands.h"
+#include "client/cli/engine_output.h"
 #include "client/cli/remote.h"
 #include "client/cli/report.h"
 
@@ -143,12 +144,30 @@ ExitCode snapshot(const SnapshotOptions& options) {
 struct SaveOptions {
   RemoteOptions server;
   std::string output;
+  std::string engine;  ///< empty: the plain files
   bool unlit = false, error_map = false, quiet = false;
 };
+
+ExitCode saveForEngine(const SaveOptions& options, const Remote& remote) {
+  auto connection = remote.connect();
+  if (!connection) return complain(connection.error());
+  const auto status = connection->call(protocol::StatusCall{});
+  if (!status) return complain(status.error());
+  const auto& error = status->progress.error;
+  ProgressDisplay display(options.quiet);
+  const auto saved = saveForEngine(remote, {options.engine, options.output}, {error.total, error.p95}, display);
+  display.clear();
+  if (!saved) return complain(saved.error());
+  for (const auto& path : saved->paths) std::printf("%s\n", path.c_str());
+  std::fprintf(stderr, "%s%s\n%s\n", outcomeText(status->progress).c_str(), surfaceText(error).c_str(),
+               saved->note.c_str());
+  return ExitCode::kOk;
+}
 
 ExitCode save(const SaveOptions& options) {
   const auto remote = remoteFrom(options.server);
   if (!remote) return complain(remote.error());
+  if (!options.engine.empty()) return saveForEngine(options, *remote);
   ProgressDisplay display(options.quiet);
   const SaveRequest request{
       .glb_path = options.output, .unlit = options.unlit, .png_path = {}, .error_map = options.error_map};
@@ -228,9 +247,11 @@ void addSave(CLI::App& app, Run& run) {
                   "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
       ->required()
       ->type_name("OUT.glb");
-  command.add_flag("--unlit", options->unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
-  command.add_flag("--error-map", options->error_map,
-                   "also the standard error of each texel, in lux: NAME.error.<page>.exr");
+  auto* unlit =
+      command.add_flag("--unlit", options->unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
+  auto* error_map = command.add_flag("--error-map", options->error_map,
+                                     "also the standard error of each texel, in lux: NAME.error.<page>.exr");
+  addEngineOption(command, options->engine)->excludes(unlit)->excludes(error_map);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return save(*options); }; });
 }

@@ -1,15 +1,7 @@
 #include "client/cli/ktx2.h"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -19,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/child_process.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/transcoder_files.h"
@@ -30,10 +23,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr std::string_view kExtension = "KHR_texture_basisu";
-constexpr int kNoProgram = 127;
-constexpr std::size_t kMostText = 4096;
-/// Of node, whose picture it is not told; ten megapixels take a second.
-constexpr std::chrono::minutes kMostTime{10};
 
 struct Folder {
   explicit Folder(std::string name) : path(std::move(name)) {}
@@ -60,63 +49,6 @@ Result<void> write(const fs::path& path, std::string_view bytes) {
   file.close();
   if (file) return {};
   return fail(ErrorCode::kUnavailable, std::string("cannot be written: ") + std::strerror(errno), path.string());
-}
-
-/// Runs in the child, between fork and exec: only async-signal-safe calls.
-[[noreturn]] void become(const std::vector<char*>& arguments, int errors) {
-  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) signal(number, SIG_DFL);
-  dup2(errors, STDERR_FILENO);
-  dup2(errors, STDOUT_FILENO);
-  execvp(arguments[0], arguments.data());
-  _exit(kNoProgram);
-}
-
-struct Ran {
-  int exit_code = 0;  ///< 128 + signal where one ended it
-  std::string text;   ///< the first of what it printed
-};
-
-/// What the child prints until it ends. Errors: a signal has come, or it takes too long; the child is there still.
-Result<std::string> readAll(int from) {
-  std::string text;
-  std::array<char, 1024> part{};
-  const auto end = std::chrono::steady_clock::now() + kMostTime;
-  for (;;) {
-    if (interrupted()) return fail(ErrorCode::kCancelled, "interrupted");
-    if (std::chrono::steady_clock::now() > end) return fail(ErrorCode::kUnavailable, "node does not come to an end");
-    constexpr int kTickMs = 50;
-    pollfd wait{from, POLLIN, 0};
-    if (poll(&wait, 1, kTickMs) <= 0) continue;
-    const auto count = read(from, part.data(), part.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return text;
-    const auto room = kMostText - std::min(kMostText, text.size());
-    text.append(part.data(), std::min(room, static_cast<std::size_t>(count)));
-  }
-}
-
-Result<Ran> run(std::vector<std::string> command) {
-  std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC) != 0) return fail(ErrorCode::kUnavailable, std::string("pipe: ") + strerror(errno));
-  std::vector<char*> arguments;
-  for (auto& word : command) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const pid_t child = fork();
-  if (child == 0) become(arguments, ends[1]);
-  close(ends[1]);
-  if (child < 0) {
-    close(ends[0]);
-    return fail(ErrorCode::kUnavailable, std::string("fork: ") + strerror(errno));
-  }
-  auto text = readAll(ends[0]);
-  close(ends[0]);
-  if (!text) kill(child, SIGKILL);
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
-  if (!text) return tl::unexpected(text.error());
-  Ran ran{WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), std::move(*text)};
-  while (!ran.text.empty() && ran.text.back() == '\n') ran.text.pop_back();
-  return ran;
 }
 
 /// Whether a texture has no picture but one of KTX2. What is no sound glTF needs none: whoever reads it says why.
@@ -150,7 +82,7 @@ Result<void> transcode(const fs::path& folder, const std::string& from, const st
   for (const auto& [file, bytes] :
        {std::pair(script, files.script), std::pair(basis, files.basis_script), std::pair(wasm, files.basis_wasm)})
     if (auto written = write(file, bytes); !written) return written;
-  const auto ran = run({"node", script.string(), basis.string(), wasm.string(), from, to});
+  const auto ran = runProgram({"node", script.string(), basis.string(), wasm.string(), from, to});
   if (!ran) return tl::unexpected(ran.error());
   if (ran->exit_code == kNoProgram)
     return fail(ErrorCode::kUnsupported,

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "client/cli/commands.h"
+#include "client/cli/engine_output.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/ktx2.h"
 #include "client/cli/measure.h"
@@ -34,7 +35,7 @@ constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps st
 constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png;  ///< output: empty where nothing but planes is asked for
+  std::string scene, output, report, png, engine;  ///< output: empty for planes alone; of an engine: a folder
   MeasureOptions measure;
   ProbeOptions probes;
   SkyOptions sky;
@@ -102,14 +103,19 @@ class Solve {
     if (auto ready = checkProbes(options_.probes); !ready) return ready;
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
-    if (!options_.output.empty())
-      if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
+    const bool is_folder = !options_.engine.empty();
+    if (!options_.output.empty()) {
+      const auto ready =
+          is_folder ? checkEngineFolder(options_.output) : glbStem(options_.output).map([](const auto&) {});
+      if (!ready) return ready;
+    }
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
       if (!external) return tl::unexpected(external.error());
       by_path_ = *external && !needsKtx2(options_.scene);
     }
-    return checkOutputs({options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
+    return checkOutputs(
+        {is_folder ? "" : options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
   }
 
   Result<void> findServer() {
@@ -267,9 +273,10 @@ class Solve {
         (chooses ? error.total : error.texels) <= options_.error && (!chooses || status.progress.state == "converged");
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings", percentText(error.total)));
-    auto written = save();
+    if (!options_.engine.empty()) addSurfaceError(connection, status);  // which goes into the folder
+    auto written = save(status.progress.error);
     if (!written) return complainOf(CallFailure{written.error()});
-    addSurfaceError(connection, status);
+    if (options_.engine.empty()) addSurfaceError(connection, status);
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
       if (!done) return complain(done.error());
@@ -293,8 +300,15 @@ class Solve {
     return reached ? ExitCode::kOk : ExitCode::kShort;
   }
 
-  Result<std::vector<std::string>> save() {
+  Result<std::vector<std::string>> save(const protocol::ErrorParts& error) {
     if (options_.output.empty()) return std::vector<std::string>();
+    if (!options_.engine.empty()) {
+      const EngineRequest request{options_.engine, options_.output, options_.png};
+      auto saved = saveForEngine(remote_, request, {error.total, error.p95}, display_);
+      if (!saved) return tl::unexpected(saved.error());
+      display_.message(saved->note);
+      return std::move(saved->paths);
+    }
     return saveScene(remote_,
                      {.glb_path = options_.output,
                       .unlit = options_.unlit,
@@ -352,17 +366,18 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
                   "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
       ->required()
       ->type_name("OUT.glb");
-  command.add_flag("--unlit", options.unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
-  command.add_flag("--error-map", options.error_map,
-                   "also the standard error of each texel, in lux: NAME.error.<page>.exr");
+  auto* unlit =
+      command.add_flag("--unlit", options.unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
+  auto* error_map = command.add_flag("--error-map", options.error_map,
+                                     "also the standard error of each texel, in lux: NAME.error.<page>.exr");
+  addEngineOption(command, options.engine)->excludes(unlit)->excludes(error_map);
   command.add_option("--png", options.png, "also a picture from the scene's camera, or from one that frames it")
       ->type_name("FILE");
   command.add_option("--report", options.report, "also figures about the solve, as JSON")->type_name("FILE");
 }
 
 /// How to solve, and where.
-void addSolvingOptions(CLI::App& app, SolveOptions& of) {
-  auto& command = app;
+void addSolvingOptions(CLI::App& command, SolveOptions& of) {
   auto* options = &of;
   command
       .add_option(

@@ -7,6 +7,7 @@ const resolve = {
   alias: {
     'gltf-validator': here('node_modules/gltf-validator/index.js'),
     'playwright-core': here('node_modules/playwright-core/index.mjs'),
+    'three/addons': here('node_modules/three/examples/jsm'),
     three: here('node_modules/three'),
   },
 };

@@ -91,7 +91,8 @@ OWN_INCLUDES = [
     ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),
     (r"server/(main|options|service_notify)[^/]*$", ["common/", "protocol/", "server/"]),
     ("client/lib/", ["common/", "protocol/", "client/lib/"]),
-    ("client/cli/", ["common/", "protocol/", "client/lib/", "client/cli/"]),
+    ("client/engines/", ["common/", "client/engines/"]),
+    ("client/cli/", ["common/", "protocol/", "client/lib/", "client/engines/", "client/cli/"]),
 ]
 
 # What a file of the viewer may import of ours: files of its own folder, and of these. The folders are below VIEWER.
@@ -128,7 +129,7 @@ LIBRARY_HOMES = [
     (r"boost/", "Boost", ["server/net/", r"server/(main|options)[^/]*$", "client/lib/", "tests/"]),
     (r"sqlite3", "SQLite", ["server/state/", "tests/"]),
     (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
-    (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
+    (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/engines/", "client/lib/", "tests/"]),
     (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
     (r"webp/", "the WebP decoder", ["server/scene/document/", "tests/"]),
     (r"(draco/|meshoptimizer)", "decoders of compressed geometry", ["server/scene/compression/", "tests/"]),

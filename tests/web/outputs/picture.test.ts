@@ -6,14 +6,9 @@ import type { AddressInfo } from 'node:net';
 import { basename, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { Pages } from '../browser/harness';
-import { viewOf, withTexture } from './glb';
-import { filesBelow, folder, SCENES, solve, trace } from './solve';
-
-const WIDTH = 480;
-const HEIGHT = 360;
-/** Side of the squares of pixels that are compared: wider than texels are in the picture, so that their blur is not. */
-const BLOCK = 24;
-const PATHS = 16; // a pixel; 9,216 a block, whose mean they know to some 0.7 %
+import { withTexture } from './glb';
+import { compare, expectTheSame, fromBase64, HEIGHT, traced, WIDTH, type Difference } from './pictures';
+import { filesBelow, folder, SCENES, solve } from './solve';
 
 const out = folder();
 const pages = new Pages();
@@ -63,55 +58,7 @@ async function drawn(name: string, kind?: string): Promise<Float32Array> {
     what,
   );
   await pages.closeAll();
-  const bytes = Buffer.from(text, 'base64');
-  const rgba = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
-  const rgb = new Float32Array(3 * WIDTH * HEIGHT);
-  for (let y = 0; y < HEIGHT; ++y)
-    for (let x = 0; x < WIDTH; ++x)
-      for (let c = 0; c < 3; ++c) rgb[3 * (y * WIDTH + x) + c] = rgba[4 * ((HEIGHT - 1 - y) * WIDTH + x) + c]!;
-  return rgb;
-}
-
-async function traced(scene: string, name: string): Promise<Float32Array> {
-  const { eye, at, yfov } = viewOf(scene);
-  const file = join(out, `${name}.f32`);
-  const size = ['--width', WIDTH, '--height', HEIGHT, '--paths', PATHS];
-  await trace(scene, file, '--eye', ...eye, '--at', ...at, '--yfov', yfov, ...size);
-  const bytes = readFileSync(file);
-  return new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
-}
-
-/** Mean of each channel over each block. */
-function blocks(picture: Float32Array): number[] {
-  const across = WIDTH / BLOCK;
-  const sums = new Array<number>(3 * across * (HEIGHT / BLOCK)).fill(0);
-  picture.forEach((value, i) => {
-    const pixel = Math.floor(i / 3);
-    const block = Math.floor(Math.floor(pixel / WIDTH) / BLOCK) * across + Math.floor((pixel % WIDTH) / BLOCK);
-    sums[3 * block + (i % 3)]! += value / BLOCK ** 2;
-  });
-  return sums;
-}
-
-interface Difference {
-  /** Of all radiance in the picture. */
-  ratio: number;
-  /** Of the blocks' differences, relative to what is there and a hundredth of the mean. */
-  rms: number;
-  worst: number;
-}
-
-function compare(ours: Float32Array, truth: Float32Array): Difference {
-  const a = blocks(ours);
-  const b = blocks(truth);
-  const sum = (values: readonly number[]) => values.reduce((total, value) => total + value, 0);
-  const floor = (0.01 * sum(b)) / b.length;
-  const relative = a.map((value, i) => (value - b[i]!) / (b[i]! + floor));
-  return {
-    ratio: sum(a) / sum(b),
-    rms: Math.sqrt(sum(relative.map((value) => value * value)) / relative.length),
-    worst: Math.max(...relative.map(Math.abs)),
-  };
+  return fromBase64(text);
 }
 
 const QUALITY = ['--quiet', '--error', '0.01', '--texels', '80000', '--time-limit', '20'];
@@ -123,20 +70,10 @@ async function solved(name: string, scene = join(SCENES, `${name}.glb`)): Promis
 
 async function differenceOf(name: string, scene?: string): Promise<Difference> {
   const file = await solved(name, scene);
-  const difference = compare(await drawn(name, 'MeshLambertMaterial'), await traced(file, name));
+  const difference = compare(await drawn(name, 'MeshLambertMaterial'), await traced(file, join(out, `${name}.f32`)));
   console.log(`${name}: ratio ${difference.ratio.toFixed(4)}, RMS ${difference.rms.toFixed(4)}, worst ${difference.worst.toFixed(3)}`); // prettier-ignore
   expect(pages.complaints.splice(0)).toEqual([]);
   return difference;
-}
-
-/**
- * The light in all is known to 0.1 % and solved to 1 %. Blocks differ by 1.3 to 2.2 %: by the paths' noise, by shadows and
- * contacts narrower than texels, and by the mip levels of textures. A lightmap that is upside down is off by 30 % and
- * more, pi in the wrong place by a factor of three.
- */
-function expectTheSame({ ratio, rms }: Difference): void {
-  expect(Math.abs(ratio - 1)).toBeLessThan(0.01);
-  expect(rms).toBeLessThan(0.03);
 }
 
 it('the Cornell box', async () => expectTheSame(await differenceOf('cornell')));
