@@ -4,7 +4,7 @@ namespace radiosity::engine {
 namespace {
 
 /// Of the error that is asked for, what a measured one may be off by.
-constexpr double kWantedPart = 0.2;
+constexpr double kWantedPart = 0.12;
 
 }  // namespace
 

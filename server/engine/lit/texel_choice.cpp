@@ -14,7 +14,7 @@ constexpr std::uint64_t kPilotTexels = 16'000;
 /// Of the error asked for so much may be the solver's and so much that of texels. Lookups have two thirds of the
 /// solver's, since they average its noise over four texels. Where that is too much by chance the solve goes on
 /// (solveCloser), and nothing is lost; texels that are too wide by chance take another layout.
-constexpr double kSolversPart = 0.9, kTexelsPart = 0.8;
+constexpr double kSolversPart = 0.9, kTexelsPart = 0.72;
 /// Of what texels leave that are to be replaced. With all of it, noise passed for shadows' edges in the small room,
 /// which then took 400,000 texels in the place of 54,000.
 constexpr double kDraftsPart = 0.6;

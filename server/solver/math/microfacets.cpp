@@ -95,4 +95,16 @@ Reflection reflectByMicrofacets(const glm::dvec3& normal, const glm::dvec3& dire
   return reflection;
 }
 
+/// Heights of microfacets are evenly spread, so that what one hides from one side and the other go together: Smith's
+/// masking and shadowing is that of Heitz (2014, "Understanding the Masking-Shadowing Function"), correlated by height.
+OneBounce bounceOnce(const glm::dvec3& normal, const glm::dvec3& direction, const glm::dvec3& out, double roughness) {
+  const double width = roughness * roughness, in_z = -glm::dot(normal, direction), out_z = glm::dot(normal, out);
+  if (width < kLeastWidth || in_z <= 0.0 || out_z <= 0.0) return {};
+  const auto facet = glm::normalize(out - direction);
+  const double z = glm::dot(normal, facet), spread = z * z * (width * width - 1.0) + 1.0;
+  const double facets = width * width / (std::numbers::pi * spread * spread);
+  const auto hidden = [&](double cosine) { return cosine > kAlong ? 0.0 : lambda(cosine, width); };
+  return {facets / ((1.0 + hidden(in_z) + hidden(out_z)) * 4.0 * in_z), edgeOf(glm::dot(facet, out))};
+}
+
 }  // namespace radiosity::solver

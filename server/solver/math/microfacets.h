@@ -30,4 +30,12 @@ struct Reflection {
 [[nodiscard]] Reflection reflectByMicrofacets(const glm::dvec3& normal, const glm::dvec3& direction, double roughness,
                                               std::uint64_t key);
 
+/// Of all light that such a surface reflects, the part by solid angle that leaves along `out` after one bounce, if
+/// nothing is absorbed; and Schlick's (1 - cos)^5 of that. Of a perfect mirror: none.
+struct OneBounce {
+  double density = 0.0, edge = 0.0;
+};
+[[nodiscard]] OneBounce bounceOnce(const glm::dvec3& normal, const glm::dvec3& direction, const glm::dvec3& out,
+                                   double roughness);
+
 }  // namespace radiosity::solver

@@ -99,6 +99,7 @@ void PlaceLight::takeMirrors(const scene::PatchMaterials& materials) {
                        [&](const LightPolygon& lamp) { return channelSum(lamp.emission) > least_imaged_; });
   lamp_images_ = find(bright, {});
   source_images_ = find({}, sources_);
+  glints_ = LampGlints(lamps_);
   if (!sources_.empty()) spreadSources();
 }
 
@@ -274,15 +275,18 @@ glm::dvec3 PlaceLight::reflectedBy(const Spot& spot, std::uint64_t key, std::siz
 /// What a ray that met a mirror sees in it, beside the light of the mirror's own leaf. Lamps count in full there, since
 /// direct light does not come by way of mirrors, but for those that are looked for as images.
 glm::dvec3 PlaceLight::alongMirrors(const Met& met) const {
-  glm::dvec3 sum(0.0);
-  followMirrors(tinted_, mirrors_.get(), {met.value, met.end, met.direction, met.key},
-                [&](const RayEnd& at, const glm::dvec3& part, const MirrorHop& hop) {
-                  sum += part * leaving(at.value, at.end, at.key, met.steps);
-                  const bool is_imaged = hop.number == 0 && hop.bounces == 1 && lamp_images_.isIn(hop.mirror);
-                  if (at.value >= lamp_emission_.size()) return;
-                  if (is_imaged && channelSum(lamp_emission_[at.value]) > least_imaged_) return;
-                  sum += part * glm::dvec3(lamp_emission_[at.value]);
-                });
+  if (!mirrors_) return glm::dvec3(0.0);
+  const RayEnd first{met.value, met.end, met.direction, met.key};
+  auto sum = glints_.look(tinted_, *mirrors_, first);
+  followMirrors(tinted_, mirrors_.get(), first, [&](const RayEnd& at, const glm::dvec3& part, const MirrorHop& hop) {
+    sum += part * leaving(at.value, at.end, at.key, met.steps);
+    if (at.value >= lamp_emission_.size() || lamp_emission_[at.value] == glm::vec3(0.0F)) return;
+    const auto& emission = lamp_emission_[at.value];
+    const bool is_first = hop.number == 0 && hop.bounces == 1;
+    if (is_first && lamp_images_.isIn(hop.mirror) && channelSum(emission) > least_imaged_) return;
+    const double weight = is_first ? glints_.weightOf(*mirrors_, first, at, emission) : 1.0;
+    sum += weight * part * glm::dvec3(emission);
+  });
   return sum;
 }
 

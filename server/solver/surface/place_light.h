@@ -22,6 +22,7 @@
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
 #include "server/solver/surface/bright_leaves.h"
+#include "server/solver/surface/lamp_glints.h"
 #include "server/solver/surface/tinted_rays.h"
 
 namespace radiosity::solver {
@@ -160,6 +161,7 @@ class PlaceLight {
   std::shared_ptr<const SpecularLeaves> mirrors_;  ///< null: none
   std::vector<glm::vec3> lamp_emission_;           ///< by leaf value, of lamps; empty: no mirror shows any
   Images lamp_images_, source_images_;
+  LampGlints glints_;          ///< of lamps, but for crowds
   float least_imaged_ = 0.0F;  ///< emission of lamps of the former, at least
 };
 

@@ -26,7 +26,7 @@ constexpr std::array<std::array<double, 2>, 1> kBothEstimates{{{0.5, 0.5}}};
 constexpr std::array<std::array<double, 2>, 2> kEachEstimate{{{1.0, 0.0}, {0.0, 1.0}}};
 constexpr double kLeastOfP95 = 0.1;
 /// Of a total, what it may be off by.
-constexpr double kSurePart = 0.25;
+constexpr double kSurePart = 0.12;
 
 /// Part of the places that are spread by area alone.
 constexpr double kByArea = 0.5;
@@ -84,34 +84,41 @@ SurfaceError::SurfaceError(const SolvedScene& solved, std::uint64_t seed, std::s
   std::vector<double> up_to;
   double all = 0.0;
   for (std::size_t value = 0; value < risks.size(); ++value) up_to.push_back(all += areaOf(value) * density(value));
-  for (std::uint32_t i = 0; i < places; ++i) {  // one of each stretch
-    const auto at = sobol4(i, seed_);
-    const double where = (static_cast<double>(i) + uniformFromKey(mixKeys(seed_, i))) / static_cast<double>(places);
-    const auto value = static_cast<std::uint32_t>(std::ranges::upper_bound(up_to, where * all) - up_to.begin());
-    if (value >= up_to.size()) continue;
-    spots_.push_back(light_.spotOn(value, glm::vec2(at.x, at.y)));
-    stands_for_.push_back(1.0 / (static_cast<double>(places) * density(value)));
+  for (std::uint32_t round = 0; round < kMostRounds; ++round) {
+    const auto key = mixKeys(seed_, round);
+    for (std::uint32_t i = 0; i < places; ++i) {  // one of each stretch
+      const auto at = sobol4(i, key);
+      const double where = (static_cast<double>(i) + uniformFromKey(mixKeys(key, i))) / static_cast<double>(places);
+      const auto value = static_cast<std::uint32_t>(std::ranges::upper_bound(up_to, where * all) - up_to.begin());
+      if (value >= up_to.size()) continue;
+      spots_.push_back(light_.spotOn(value, glm::vec2(at.x, at.y)));
+      stands_for_.push_back(1.0 / (static_cast<double>(places) * density(value)));
+    }
+    round_ends_.push_back(spots_.size());
   }
-  sums_.resize(spots_.size());
+  light_at_.resize(spots_.size());
 }
 
 std::vector<SurfaceError::Lookup> SurfaceError::lookups() const {
   std::vector<Lookup> lookups;
-  for (const auto& spot : spots_) {
-    const auto& side = light_.rays().sideOf(spot.place.value);
-    lookups.push_back({side.surface, side.side, spot.texel});
-  }
+  for (std::size_t i = 0; i < spots_.size(); ++i) lookups.push_back(lookupAt(i));
   return lookups;
+}
+
+SurfaceError::Lookup SurfaceError::lookupAt(std::size_t place) const {
+  const auto& side = light_.rays().sideOf(spots_[place].place.value);
+  return {side.surface, side.side, spots_[place].texel};
 }
 
 bool SurfaceError::advance(double seconds) {
   RAD_CHECK_EQ(found_.size(), spots_.size());
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  is_done_ = is_done_ || spots_.empty();
   while (!is_done_) {
     addSlice();
     // Whatever is thrown from here on, the round is whole.
-    if (done_ == 0) is_done_ = spots_.empty() || rounds_ >= most_rounds_ || isSure();
+    if (isWhole()) is_done_ = rounds_ >= most_rounds_ || isSure();
     if (spent() >= seconds) break;
   }
   return is_done_;
@@ -119,47 +126,29 @@ bool SurfaceError::advance(double seconds) {
 
 /// Where memory ends in the middle of it nothing of it is added.
 void SurfaceError::addSlice() {
-  const auto first = done_, end = std::min(spots_.size(), first + kPlacesASlice);
+  const auto first = done_, end = std::min(round_ends_[rounds_], first + kPlacesASlice);
   std::vector<std::array<glm::dvec3, 2>> arriving(end - first);
   inTurns(2 * arriving.size(), [&](std::size_t part) {
     const auto i = first + part / 2;
-    arriving[part / 2][part % 2] = light_.arriving(spots_[i], mixKeys(mixKeys(seed_, i), 2 * rounds_ + part % 2));
+    arriving[part / 2][part % 2] = light_.arriving(spots_[i], mixKeys(mixKeys(seed_, i), part % 2));
   });
-  for (std::size_t k = 0; k < arriving.size(); ++k)
-    for (std::size_t estimate = 0; estimate < 2; ++estimate) sums_[first + k][estimate] += arriving[k][estimate];
+  std::ranges::copy(arriving, light_at_.begin() + static_cast<std::ptrdiff_t>(first));
   done_ = end;
-  if (done_ < spots_.size()) return;
-  done_ = 0;
-  ++rounds_;
+  if (done_ == round_ends_[rounds_]) ++rounds_;
 }
 
-/// Of what the total may be off by only the part helps to measure again that is the noise of the estimates. By channel,
-/// of the product of what a lookup differs from both by, the square of that is e^2 2 s^2 + s^4, where the lookup is off
-/// by e and each estimate by s; of one difference d of both, s^2 is d^2 / 2 and s^4 is d^4 / 12 in the mean.
+/// More places tell more of both: of edges that few of them lie on, and of the noise of the estimates.
 bool SurfaceError::isSure() const {
-  double noise = 0.0, light = 0.0;
-  for (std::size_t i = 0; i < spots_.size(); ++i) {
-    const auto one = trueLight(i, 0), other = trueLight(i, 1), found = glm::dvec3(found_[i]);
-    const auto square = glm::max((found - one) * (found - other), 0.0), apart = (one - other) * (one - other);
-    noise += stands_for_[i] * stands_for_[i] * (glm::dot(square, apart) + glm::dot(apart, apart) / 12.0);
-    light += stands_for_[i] * glm::dot(one, other);
-  }
-  if (!(light > 0.0)) return true;
-  const double total = stated().total, deviation = std::sqrt(noise) / light;  // of the square
-  const double wanted = std::max(wanted_deviation_, kSurePart * total);
-  return deviation <= std::max(2.0 * total, wanted) * wanted;
-}
-
-glm::dvec3 SurfaceError::trueLight(std::size_t place, std::size_t estimate) const {
-  return sums_[place][estimate] / static_cast<double>(rounds_);
+  const auto parts = stated();
+  return parts.deviation <= std::max(wanted_deviation_, kSurePart * parts.total);
 }
 
 std::vector<SurfaceError::Measured> SurfaceError::measured() const {
   std::vector<Measured> all;
-  for (std::size_t i = 0; i < spots_.size(); ++i) {
+  const auto rounds = static_cast<double>(std::max(1U, rounds_));
+  for (std::size_t i = 0; i < placeCount(); ++i) {
     const glm::dvec3 found(found_[i]);
-    all.push_back({light_.rays().sideOf(spots_[i].place.value).surface,
-                   glm::dot(found - trueLight(i, 0), found - trueLight(i, 1)), stands_for_[i]});
+    all.push_back({lookupAt(i), glm::dot(found - trueLight(i, 0), found - trueLight(i, 1)), stands_for_[i] / rounds});
   }
   return all;
 }
@@ -167,10 +156,10 @@ std::vector<SurfaceError::Measured> SurfaceError::measured() const {
 /// The estimates are independent, so that their noise cancels in the product of what a lookup differs from either by.
 SurfaceErrorParts SurfaceError::stated() const {
   SurfaceErrorParts parts;
-  parts.places = spots_.size();
-  const auto count = static_cast<double>(spots_.size());
+  parts.places = placeCount();
+  const auto count = static_cast<double>(parts.places);
   double wrong = 0.0, squares = 0.0, light = 0.0, mean = 0.0, area = 0.0;
-  for (std::size_t i = 0; i < spots_.size(); ++i) {
+  for (std::size_t i = 0; i < placeCount(); ++i) {
     const glm::dvec3 found(found_[i]);
     const auto one = trueLight(i, 0), other = trueLight(i, 1);
     const double product = stands_for_[i] * glm::dot(found - one, found - other);
@@ -204,7 +193,7 @@ SurfaceErrorParts SurfaceError::stated() const {
 double SurfaceError::percentile(std::span<const std::array<double, 2>> weights, double floor) const {
   std::vector<std::pair<double, double>> off;  // and the area of that
   double area = 0.0;
-  for (std::size_t i = 0; i < spots_.size(); ++i) {
+  for (std::size_t i = 0; i < placeCount(); ++i) {
     const double one = channelMean(trueLight(i, 0)), other = channelMean(trueLight(i, 1));
     const double found = channelMean(glm::dvec3(found_[i])), light = std::max(0.5 * (one + other), floor);
     for (const auto& weight : weights) {

@@ -26,7 +26,7 @@ struct SurfaceErrorParts {
 class SurfaceError {
  public:
   static constexpr std::size_t kPlaces = 2048;
-  /// Each place is estimated so often at most, until the total is known well enough.
+  /// So many rounds of kPlaces at most, until the total is known well enough.
   static constexpr std::uint32_t kMostRounds = 8;
 
   /// Places are spread over all that has texels: half of them by area, half where lookups are likelier to be off, since
@@ -35,14 +35,14 @@ class SurfaceError {
   /// Throws std::bad_alloc.
   SurfaceError(const SolvedScene& solved, std::uint64_t seed, std::size_t places = kPlaces);
 
-  /// Where lookups are to be made.
+  /// Where lookups are to be made, for all rounds.
   struct Lookup {
     std::uint32_t surface = 0, side = 0;
     glm::vec2 texel{0.0F};
   };
   [[nodiscard]] std::vector<Lookup> lookups() const;
-  /// A total is measured again that is likely to be off by more than this, and by more than a quarter of itself, since
-  /// the truth that lookups are held against is an estimate.
+  /// More places are measured while the total is likely to be off by more than this, and by more than an eighth of
+  /// itself.
   void setWantedDeviation(double deviation) { wanted_deviation_ = deviation; }
   /// There is no time for another round.
   void hurry() { most_rounds_ = std::min(most_rounds_, rounds_ + 1); }
@@ -53,9 +53,9 @@ class SurfaceError {
   /// Where the cuts lie changes no bit. Cost: PlaceLight, twice a place and round; a quarter of a second on two cores
   /// in a room of a thousand triangles, a round.
   [[nodiscard]] bool advance(double seconds);
-  /// When it is done: what was found at each place, in the order of lookups().
+  /// When it is done: what was found at each place that was measured, in the order of lookups().
   struct Measured {
-    std::uint32_t surface = 0;
+    Lookup lookup;
     double square = 0.0;  ///< of what the lookup is off by, all channels, lux^2: below zero by chance
     double area = 0.0;    ///< that the place stands for, unit box squared
   };
@@ -65,18 +65,25 @@ class SurfaceError {
 
  private:
   [[nodiscard]] double percentile(std::span<const std::array<double, 2>> weights, double floor) const;
+  [[nodiscard]] Lookup lookupAt(std::size_t place) const;
   void addSlice();
   [[nodiscard]] bool isSure() const;
   /// Irradiance, lux: one of the two estimates of a place.
-  [[nodiscard]] glm::dvec3 trueLight(std::size_t place, std::size_t estimate) const;
+  [[nodiscard]] const glm::dvec3& trueLight(std::size_t place, std::size_t estimate) const {
+    return light_at_[place][estimate];
+  }
+  /// Of all rounds that are whole.
+  [[nodiscard]] std::size_t placeCount() const { return rounds_ > 0 ? round_ends_[rounds_ - 1] : 0; }
+  [[nodiscard]] bool isWhole() const { return rounds_ > 0 && done_ == placeCount(); }
 
   PlaceLight light_;
   std::uint64_t seed_;
   std::vector<PlaceLight::Spot> spots_;
-  std::vector<double> stands_for_;  ///< unit box squared, by place
+  std::vector<double> stands_for_;  ///< unit box squared, by place, of its round alone
+  std::vector<std::size_t> round_ends_;
   std::vector<glm::vec3> found_;
-  std::vector<std::array<glm::dvec3, 2>> sums_;  ///< two independent estimates, by place, each of all rounds
-  std::size_t done_ = 0;                         ///< places of this round
+  std::vector<std::array<glm::dvec3, 2>> light_at_;  ///< two independent estimates, by place
+  std::size_t done_ = 0;                             ///< places
   std::uint32_t rounds_ = 0, most_rounds_ = kMostRounds;
   bool is_done_ = false;
   double wanted_deviation_ = 1.0;

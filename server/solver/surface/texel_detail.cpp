@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "server/solver/patches/side.h"
@@ -21,9 +22,6 @@ constexpr double kFinest = 8.0, kCoarsest = 0.5;
 constexpr double kMostDetail = 64.0, kLeastDetail = 0.5;
 /// With fewer of them nothing would be known of what coarser ones hide.
 constexpr double kFewTexels = 64.0;
-/// Mean products of the weights that lookups in the half of a leaf towards a neighbour give to both, along one axis: of
-/// the leaf's own weight with itself, of both, and of the neighbour's with itself.
-constexpr double kOwnOwn = 7.0 / 12.0, kOwnNext = 1.0 / 6.0, kNextNext = 1.0 / 12.0;
 /// So much of what is measured is texels' own at least, whatever noise there is said to be.
 constexpr double kLeastOwn = 0.1;
 
@@ -56,31 +54,6 @@ struct Grid {
     }
   }
 
-  /// Area times the square of what lookups on a leaf have, in the mean, of the noise of texels: smoothing makes those
-  /// alike that lie side by side, and what they have in common no lookup averages. Fits make it larger where light
-  /// bends (fitTexels), which is left out: they do where most of the bend is light.
-  [[nodiscard]] double noiseOfLookups(std::uint32_t x, std::uint32_t y) const {
-    const auto noiseAt = [&](std::uint32_t nx, std::uint32_t ny) {
-      // Beyond the chart, and where nothing is known, lookups find what is nearest.
-      const auto i = nx < width && ny < height && area[at(nx, ny)] > 0.0 ? at(nx, ny) : at(x, y);
-      return 0.5 * (light[0][i] - light[1][i]);
-    };
-    const auto along = [](const glm::dvec3& own, const glm::dvec3& next, const glm::dvec3& other_own,
-                          const glm::dvec3& other_next) {
-      return kOwnOwn * glm::dot(own, other_own) + kOwnNext * (glm::dot(own, other_next) + glm::dot(next, other_own)) +
-             kNextNext * glm::dot(next, other_next);
-    };
-    double sum = 0.0;
-    for (const auto nx : {x - 1, x + 1}) {
-      for (const auto ny : {y - 1, y + 1}) {
-        const auto own = noiseAt(x, y), beside = noiseAt(nx, y), above = noiseAt(x, ny), across = noiseAt(nx, ny);
-        sum += kOwnOwn * along(own, beside, own, beside) + 2.0 * kOwnNext * along(own, beside, above, across) +
-               kNextNext * along(above, across, above, across);
-      }
-    }
-    return 0.25 * area[at(x, y)] * sum;
-  }
-
   [[nodiscard]] Grid coarser() const {
     Grid coarse;
     coarse.width = (width + 1) / 2;
@@ -107,8 +80,7 @@ struct Grid {
 struct Need {
   double texels = 0.0;                   ///< with area
   double detail = 1.0;                   ///< Surface::detail
-  double square = 0.0, noise = 0.0;      ///< area times irradiance squared, and what lookups have of noise
-  double common = 0.0;                   ///< area times the square of what both halves are off by
+  double square = 0.0;                   ///< area times irradiance squared
   std::array<Bend, 2> along, along_two;  ///< by axis; of texels, and of blocks of two by two
   double power = 0.0;                    ///< of the size of texels
   double error = 0.0;                    ///< area times the square of what lookups are off by
@@ -138,7 +110,7 @@ double powerOf(double fine, double coarse, double otherwise) {
 class DetailChooser {
  public:
   DetailChooser(const scene::PatchScene& patches, const TexelLight& light)
-      : patches_(patches), needs_(patches.surfaces.size()) {
+      : patches_(patches), light_(light), needs_(patches.surfaces.size()) {
     for (std::size_t s = 0; s < needs_.size(); ++s) {
       const auto& surface = patches.surfaces[s];
       needs_[s].detail = static_cast<double>(surface.detail);
@@ -149,15 +121,16 @@ class DetailChooser {
     findPowers();
   }
 
-  /// How much it is in all is measured: of surfaces that tell how light bends, and of all others.
+  /// How much it is in all is measured: of surfaces that tell how light bends, and of all others. What lookups have of
+  /// noise is told by the halves where they were made: of what each half is off by the product has none.
   void calibrate(std::span<const SurfaceError::Measured> measured) {
     std::array<double, 2> found{}, noise{}, expected{};
-    for (const auto& place : measured) found[needs_[place.surface].isNarrow() ? 1 : 0] += place.area * place.square;
-    for (const auto& need : needs_) {
-      const std::size_t kind = need.isNarrow() ? 1 : 0;
-      noise[kind] += need.noise + need.common;
-      expected[kind] += kind == 1 ? need.square : need.error;
+    for (const auto& place : measured) {
+      const std::size_t kind = needs_[place.lookup.surface].isNarrow() ? 1 : 0;
+      found[kind] += place.area * place.square;
+      noise[kind] += place.area * noiseAt(place.lookup);
     }
+    for (const auto& need : needs_) expected[need.isNarrow() ? 1 : 0] += need.isNarrow() ? need.square : need.error;
     for (auto& need : needs_) {
       const std::size_t kind = need.isNarrow() ? 1 : 0;
       const double own = std::max(found[kind] - noise[kind], kLeastOwn * found[kind]);
@@ -207,18 +180,36 @@ class DetailChooser {
       grid.light[0].push_back(one);
       grid.light[1].push_back(other);
       need.square += area * glm::dot(one, other);
-      if (!light.common.empty()) {
-        const auto& common = light.common[node + i];
-        need.common += area * static_cast<double>(common.x + common.y + common.z);
-      }
     }
-    for (std::uint32_t y = 0; y < grid.height; ++y)
-      for (std::uint32_t x = 0; x < grid.width; ++x) need.noise += grid.noiseOfLookups(x, y);
     const auto coarse = grid.coarser();
     for (std::uint32_t axis = 0; axis < 2; ++axis) {
       grid.addBends(axis == 0 ? 1 : 0, axis, need.along[axis]);
       coarse.addBends(axis == 0 ? 1 : 0, axis, need.along_two[axis]);
     }
+  }
+
+  /// Square of the noise that a lookup has, and of what both halves are off by: between the middles of leaves, of those
+  /// that have area. Fits make it larger where light bends (fitTexels), which is left out: they do where most of the
+  /// bend is light.
+  [[nodiscard]] double noiseAt(const SurfaceError::Lookup& lookup) const {
+    const auto& surface = patches_.surfaces[lookup.surface];
+    const auto middle = lookup.texel - 0.5F, low = glm::floor(middle), part = middle - low;
+    const auto within = [](float at, std::uint32_t count) {
+      return static_cast<std::uint32_t>(std::clamp(at, 0.0F, static_cast<float>(count - 1)));
+    };
+    glm::vec3 off(0.0F);
+    float common = 0.0F, all = 0.0F;
+    for (const auto& corner : {glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(0, 1), glm::vec2(1, 1)}) {
+      const auto x = within(low.x + corner.x, surface.width), y = within(low.y + corner.y, surface.height);
+      const auto node = surface.first_node[lookup.side] + std::size_t{y} * surface.width + x;
+      if (patches_.node_area[node] <= 0.0F) continue;
+      const auto weights = glm::mix(1.0F - part, part, corner);
+      const float weight = weights.x * weights.y;
+      off += weight * 0.5F * (light_.first[node] - light_.second[node]);
+      if (!light_.common.empty()) common += weight * glm::dot(light_.common[node], glm::vec3(1.0F));
+      all += weight;
+    }
+    return all > 0.0F ? static_cast<double>(glm::dot(off, off) / (all * all) + common / all) : 0.0;
   }
 
   void findPowers() {
@@ -273,6 +264,7 @@ class DetailChooser {
   }
 
   const scene::PatchScene& patches_;
+  TexelLight light_;
   std::vector<Need> needs_;  ///< by surface
   double square_ = 0.0;      ///< area times irradiance squared, of all
 };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
 #include "server/solver/math/polygon_form_factor.h"
 #include "tests/unit/solver/quad_scene.h"
@@ -138,6 +139,36 @@ TEST_F(SurfaceErrorTest, WhereTheCutsLieChangesNoBit) {
   EXPECT_EQ(whole.total, sliced.total);
   EXPECT_EQ(whole.p95, sliced.p95);
   EXPECT_EQ(whole.deviation, sliced.deviation);
+}
+
+// A round more has places of its own, and what is measured stands for the same area.
+TEST_F(SurfaceErrorUnderAPlate, MorePlacesTellMoreSurely) {
+  constexpr std::size_t kFew = 16;
+  const auto measure = [&](bool hurries) {
+    auto error = std::make_unique<SurfaceError>(solved(), 1, kFew);
+    std::vector<glm::vec3> found;  // as if there was no plate: few places lie in its shadow, and all that is wrong
+    for (const auto& at : error->lookups()) {
+      const glm::dvec3 place(-0.5 + static_cast<double>(at.texel.x) / 16.0, -0.4,
+                             0.5 - static_cast<double>(at.texel.y) / 16.0);
+      found.emplace_back(at.surface == 0 && at.side == 0 ? static_cast<float>(litAt(place)) : 0.0F);
+    }
+    error->take(std::move(found));
+    error->setWantedDeviation(0.0);
+    if (hurries) error->hurry();
+    while (!error->advance(1e9)) continue;
+    return error;
+  };
+  const auto few = measure(true), many = measure(false);
+  EXPECT_EQ(few->stated().places, kFew);
+  EXPECT_GT(many->stated().places, 2 * kFew);
+  EXPECT_LT(many->stated().deviation, 0.7 * few->stated().deviation);
+  EXPECT_NEAR(many->stated().total, few->stated().total, 3.0 * few->stated().deviation);
+  const auto areaOf = [](const SurfaceError& error) {
+    double area = 0.0;
+    for (const auto& place : error.measured()) area += place.area;
+    return area;
+  };
+  EXPECT_NEAR(areaOf(*many) / areaOf(*few), 1.0, 0.1);
 }
 
 // Lookups that know nothing of the plate are wrong in its shadow alone, and there by all of the light.

@@ -38,9 +38,14 @@ class TexelDetailTest : public testing::Test {
 
   /// As if every place were off by the same, all of it by texels.
   [[nodiscard]] TexelDetail choose(const DetailGoal& goal, double off = 1.0) const {
+    return chooseDetail(*scene_.patches, {light_, light_, {}}, measured(off), goal);
+  }
+
+  /// One place on each surface, between four leaves.
+  [[nodiscard]] static std::vector<SurfaceError::Measured> measured(double square) {
     std::vector<SurfaceError::Measured> measured;
-    for (std::uint32_t s = 0; s < 3; ++s) measured.push_back({s, off, 1.0});
-    return chooseDetail(*scene_.patches, {light_, light_, {}}, measured, goal);
+    for (std::uint32_t s = 0; s < 3; ++s) measured.push_back({{s, 0, glm::vec2(5.0F, 9.0F)}, square, 1.0});
+    return measured;
   }
 
   test::QuadScene scene_;
@@ -86,10 +91,9 @@ TEST_F(TexelDetailTest, MoreThatIsMeasuredAsksForMore) {
 
 // What both halves are off by is no fault of texels either: finer ones would not change it.
 TEST_F(TexelDetailTest, WhatSmoothingTookIsNotTheirs) {
-  const std::vector<SurfaceError::Measured> measured{{0, 4.0, 1.0}, {1, 4.0, 1.0}, {2, 4.0, 1.0}};
   const auto chooseWith = [&](float square) {
     const std::vector<glm::vec3> common(scene_.patches->nodeCount(), glm::vec3(square));
-    return chooseDetail(*scene_.patches, {light_, light_, common}, measured, {0.02, 1e6});
+    return chooseDetail(*scene_.patches, {light_, light_, common}, measured(4.0), {0.02, 1e6});
   };
   EXPECT_EQ(chooseWith(0.0F).present, choose({0.02, 1e6}, 4.0).present);
   // Three quarters of the square, over the three surfaces, each of area one and of three channels.
@@ -105,8 +109,7 @@ TEST_F(TexelDetailTest, NoiseIsNoBend) {
     first[node] *= (leaf * 7919U % 13U) < 6U ? 1.1F : 0.9F;
     second[node] *= (leaf * 104729U % 11U) < 5U ? 1.1F : 0.9F;
   }
-  const std::vector<SurfaceError::Measured> measured{{0, 1.0, 1.0}, {1, 1.0, 1.0}, {2, 1.0, 1.0}};
-  const auto chosen = chooseDetail(*scene_.patches, {first, second, {}}, measured, {0.02, 1e6});
+  const auto chosen = chooseDetail(*scene_.patches, {first, second, {}}, measured(1.0), {0.02, 1e6});
   EXPECT_LT(chosen.of_surface[0], chosen.of_surface[2] / 2.0F);
 }
 
@@ -123,11 +126,27 @@ TEST_F(TexelDetailTest, NoiseThatNeighboursHaveInCommonIsNotThatOfTexels) {
   auto second = light_;
   for (auto& value : second) value += 2.0F * kOff;
   const double square = 3.0 * kOff * kOff;  // of the mean of both halves
-  std::vector<SurfaceError::Measured> measured;
-  for (std::uint32_t s = 0; s < 3; ++s) measured.push_back({s, square, 1.0});
-  const auto alike = chooseDetail(*scene_.patches, {light_, second, {}}, measured, {0.02, 1e6});
-  const auto without = chooseDetail(*scene_.patches, {light_, light_, {}}, measured, {0.02, 1e6});
+  const auto alike = chooseDetail(*scene_.patches, {light_, second, {}}, measured(square), {0.02, 1e6});
+  const auto without = chooseDetail(*scene_.patches, {light_, light_, {}}, measured(square), {0.02, 1e6});
   EXPECT_LT(alike.present, 0.4 * without.present);
+}
+
+// Of four leaves that are off by ones of either sign a lookup in their midst is off by nothing, and one in the middle
+// of a leaf by all of it: the noise is that of where lookups were made.
+TEST_F(TexelDetailTest, NoiseIsThatOfWhereLookupsWereMade) {
+  auto second = light_;
+  for (std::uint32_t s = 0; s < 3; ++s) {
+    for (std::uint32_t leaf = 0; leaf < kSide * kSide; ++leaf)
+      second[scene_.patches->surfaces[s].first_node[0] + leaf] += (leaf % kSide + leaf / kSide) % 2 == 0 ? 2.0F : -2.0F;
+  }
+  const auto chosenFor = [&](const glm::vec2& offset) {
+    auto places = measured(4.0);
+    for (auto& place : places) place.lookup.texel += offset;
+    return chooseDetail(*scene_.patches, {light_, second, {}}, places, {0.02, 1e6}).present;
+  };
+  const double all = choose({0.02, 1e6}, 4.0).present;
+  EXPECT_NEAR(chosenFor({0.0F, 0.0F}) / all, 1.0, 0.03);
+  EXPECT_NEAR(chosenFor({0.5F, 0.5F}) / all, 0.5, 0.03);  // a square of three of four
 }
 
 }  // namespace
