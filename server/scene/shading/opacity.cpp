@@ -14,6 +14,7 @@
 #include "server/geometry/triangle_rows.h"
 #include "server/scene/shading/specular.h"
 #include "server/scene/values/chart_corners.h"
+#include "server/scene/values/leaf_opacity.h"
 #include "server/scene/values/material_of.h"
 #include "server/scene/values/shade_texture.h"
 
@@ -346,16 +347,6 @@ void chooseScales(PatchScene& patches, std::vector<SurfaceOpacity>& some) {
   patches.tints.assign(first, kWhite);
 }
 
-/// Calls visit(cell) for each cell of a leaf.
-template <typename Visit>
-void forCellsOf(const Surface& surface, std::uint32_t leaf, const Visit& visit) {
-  const std::uint32_t scale = surface.opacity_scale, width = surface.width * scale;
-  const std::uint32_t x0 = leaf % surface.width * scale, y0 = leaf / surface.width * scale;
-  for (std::uint32_t y = y0; y < y0 + scale; ++y) {
-    for (std::uint32_t x = x0; x < x0 + scale; ++x) visit(surface.first_opacity + std::size_t{y} * width + x);
-  }
-}
-
 /// Of what passes a leaf: by chance as much as of the channel that passes best at each place.
 glm::vec3 leafTint(const PatchScene& patches, const Surface& surface, std::uint32_t leaf) {
   glm::dvec3 passes(0.0);
@@ -383,13 +374,6 @@ void measureTints(PatchScene& patches) {
       patches.leaf_tints.push_back(leafTint(patches, surface, leaf));
   }
   if (patches.leaf_tints.empty()) patches.tints = {};
-}
-
-/// Mean over the cells of a leaf, in [0, 1].
-float leafOpacity(const PatchScene& patches, const Surface& surface, std::uint32_t leaf) {
-  std::uint64_t sum = 0;
-  forCellsOf(surface, leaf, [&](std::size_t cell) { sum += patches.opacity[cell]; });
-  return static_cast<float>(static_cast<double>(sum) / (255.0 * surface.opacity_scale * surface.opacity_scale));
 }
 
 }  // namespace
@@ -426,8 +410,7 @@ void applyOpacity(PatchScene& patches) {
     interruptionPoint();
     if (!surface.see_through) continue;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
-      float opacity = leafOpacity(patches, surface, leaf);
-      if (surface.glass.isGlass()) opacity = surface.glass.meanStopped(opacity);
+      const float opacity = stoppedByLeaf(patches, surface, leaf);
       for (const auto first : surface.first_node) {
         if (first != kNone) patches.node_area[first + leaf] *= opacity;
       }

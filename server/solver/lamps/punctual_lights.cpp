@@ -24,7 +24,7 @@ using std::numbers::pi;
 constexpr std::uint32_t kMostPointPixels = 512, kMostParallelPixels = 2048;
 
 /// A point light this far away (unit box) is a directional one: its irradiance differs by 2e-4 at most over the scene.
-constexpr double kFar = 1.0e4;
+constexpr double kFarAway = 1.0e4;
 /// A narrower sun (rad) is a direction: its half shadow, a box wide, is thinner than what positions are rounded to.
 constexpr double kLeastSun = 1.0e-6;
 
@@ -191,7 +191,7 @@ PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patche
   if (hasSizeOrWeb(light)) return makeLamp(patches, light, source);
   const double range = light.range / patches.scale;
   const double largest = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
-  if (largest > kFar) {
+  if (largest > kFarAway) {
     const glm::dvec3 towards = glm::normalize(position / largest);  // squares of 1e300 are no numbers
     const double distance = largest * glm::length(position / largest);
     const double cosine = -glm::dot(glm::dvec3(source.direction), towards);
@@ -222,7 +222,7 @@ PunctualLights::Source PunctualLights::makeLamp(const scene::PatchScene& patches
                                   : lampFlux(source.shape, light.web ? light.web->lumens : 0.0);
   const glm::dvec3 position = (light.position - patches.centre) / patches.scale;
   const double largest = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
-  if (largest > kFar) {
+  if (largest > kFarAway) {
     const glm::dvec3 towards = glm::normalize(position / largest);
     const double distance = largest * glm::length(position / largest);
     const auto lamp = source.lamp();

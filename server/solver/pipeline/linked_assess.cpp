@@ -29,7 +29,7 @@ void LinkedSolver::assess() {
   if (isRepairing()) return;  // nothing is known before all links are true
   if (shown_) return;         // it says what it said
   if (from_links_ == FromLinks::kAfterEdit) {
-    const auto behind = gather_ ? gather_->raysBehind() + gather_->looksBehind(lamp_images_, source_images_) : 0;
+    const auto behind = gather_ ? gather_->raysBehind() + gather_->looksBehind(in_mirrors_) : 0;
     if (behind > kRaysAtOnce) return;  // nor is it now: steps trace rays in slices
     // Somebody wants to know before the next step.
     tryNow([this] {
@@ -90,7 +90,7 @@ std::vector<glm::vec3> LinkedSolver::spreadLight() const {
   for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
   for (std::uint32_t value = 0; value < light[0].size(); ++value) {
     const auto arriving = 0.5F * (light[0][value] + light[1][value]);
-    const bool is_imaged = source_images_.images && source_images_.images->isIn(value);
+    const bool is_imaged = in_mirrors_.sources.images && in_mirrors_.sources.images->isIn(value);
     const bool spreads = mirrors_->has(value) && !mirrors_->isGlass(value) && !is_imaged;
     light[0][value] = spreads ? mirrors_->meanReflectance(value) * arriving : glm::vec3(0.0F);
   }
@@ -112,13 +112,13 @@ std::array<double, 3> LinkedSolver::spreadFlux() const {
 /// anything does. Nobody looks where it goes.
 std::array<double, 3> LinkedSolver::imagesThatLeave() const {
   std::array<double, 3> flux{};
-  if (!source_images_.images || !gathers()) return flux;
+  if (!in_mirrors_.sources.images || !gathers()) return flux;
   const auto& escapes = gather_->escapedFlux();
   if (escapes[0] + escapes[1] + escapes[2] <= 0.0) return flux;
   std::array<std::vector<glm::vec3>, 2> light;
   for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, light[half], LinkSystem::From::kSources);
   for (std::uint32_t value = 0; value < light[0].size(); ++value) {
-    if (!source_images_.images->isIn(value) || mirrors_->isGlass(value)) continue;
+    if (!in_mirrors_.sources.images->isIn(value) || mirrors_->isGlass(value)) continue;
     const auto reflected = mirrors_->meanReflectance(value) * 0.5F * (light[0][value] + light[1][value]);
     for (std::size_t c = 0; c < 3; ++c)
       flux[c] += static_cast<double>(system_.leafAreas()[value] * reflected[static_cast<int>(c)]);

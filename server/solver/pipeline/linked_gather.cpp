@@ -45,6 +45,9 @@ constexpr double kAlone = 1.5;
 constexpr double kSampleGain = 0.97;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
+/// Where flat mirrors are all but this part of what lamps light of all that reflects, images of lamps in these tell
+/// nearly all, and with less noise than paths from lamps.
+constexpr double kImagesTellAll = 0.02;
 /// Of the room, what the noise of images of lamps in mirrors may take, and that of colours of lamps: they fall faster
 /// than that of rays.
 constexpr double kImages = 0.2;
@@ -149,10 +152,10 @@ void LinkedSolver::startRays() {
   findImages();
 }
 
-/// Of lamps that shine, in flat mirrors. Those of a crowd are too many.
+/// Of lamps that shine. Those of a crowd are too many.
 void LinkedSolver::findImages() {
-  lamp_images_ = source_images_ = {};
-  if (!gather_ || !mirrors_ || gather_->hasNoRoomForImages()) return;
+  in_mirrors_ = {};
+  if (!gather_ || !mirrors_) return;
   std::vector<LightPolygon> lamps;
   std::vector<PunctualLights::Source> sources;
   const auto& areas = system_.leafAreas();
@@ -163,11 +166,20 @@ void LinkedSolver::findImages() {
                        [](const PunctualLights::Source& source) { return source.intensity != glm::dvec3(0.0); });
   const bool is_crowded = std::ranges::any_of(crowds_, [](const Crowd& crowd) { return !crowd.isDark(); });
   const auto find = [&](std::span<const LightPolygon> of_lamps, std::span<const PunctualLights::Source> of_sources) {
+    if (gather_->mirroredLamps().hasNoRoomForImages()) return ImagedLight::Lamps{};
     return ImagedLight::Lamps{LampImages::find(*patches_, sides_, leaf_rays_, mirrors_, of_lamps, of_sources),
                               LampImages::lightOf(of_lamps, of_sources)};
   };
-  if (!is_crowded) lamp_images_ = find(lamps, {});
-  source_images_ = find({}, sources);
+  if (!is_crowded) {
+    const auto& known = gather_->mirroredLamps();
+    in_mirrors_.images = find(lamps, {});
+    auto paths = known.hasNoRoomForCaustics() ? nullptr : CausticPaths::find(sides_, leaf_rays_, mirrors_, lamps);
+    if (paths && paths->partOutside(in_mirrors_.images.images.get()) > kImagesTellAll) {
+      in_mirrors_.images = {};
+      in_mirrors_.caustics = {std::move(paths), LampImages::lightOf(lamps, {})};
+    }
+  }
+  in_mirrors_.sources = find({}, sources);
 }
 
 std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {
@@ -198,9 +210,9 @@ std::vector<glm::vec3> LinkedSolver::lampsOfLeaves() const {
   return emission;
 }
 
-/// Of these, of the lamps that images are looked for of.
+/// Of these, of the lamps that are looked for in mirrors.
 std::vector<glm::vec3> LinkedSolver::imagedLamps() const {
-  if (!lamp_images_.images) return {};
+  if (!in_mirrors_.images.images && !in_mirrors_.caustics.paths) return {};
   auto emission = lampsOfLeaves();
   for (auto& lamp : emission)
     if (channelSum(lamp) <= least_imaged_) lamp = glm::vec3(0.0F);
@@ -215,8 +227,7 @@ LeftLight LinkedSolver::leftLight() const {
   light.mirrors = mirrors_;
   if (mirrors_) light.lamps = lampsOfLeaves();
   light.imaged_lamps = imagedLamps();
-  light.lamp_images = lamp_images_;
-  light.source_images = source_images_;
+  light.in_mirrors = in_mirrors_;
   const auto spread = spreadLight();
   for (std::size_t value = 0; value < spread.size(); ++value) light.emission[value] += spread[value];
   light.passing.assign(system_.passing().begin(), system_.passing().end());
@@ -299,7 +310,7 @@ StepOutcome LinkedSolver::chooseRays() {
   if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
   const double norm = fieldNorm(), square = std::max(norm * norm, 1e-300);
   const double of_images = gather_->imageNoise() / square, of_tints = tint_noise_ / square;
-  if (of_images > kImages * room && gather_->refineImages(of_images / (kImages * room))) return StepOutcome::kRoundDone;
+  if (gather_->refineImages(kImages * room * square)) return StepOutcome::kRoundDone;
   if (of_tints > kImages * room && tints_.refine(of_tints / (kImages * room))) return StepOutcome::kRoundDone;
   // What is left of that is not theirs to lower.
   const double room_beside = std::max(room - of_images - of_tints, kLeastRoom * room);

@@ -99,7 +99,7 @@ bool LinkedSolver::lightLeaves() {
     if (gather_) gather_->begin(leftLight());
   }
   const bool is_done = !gather_ || gather_->advance(kSliceSeconds);
-  if (gather_ && gather_->hasNoRoomForImages() && (lamp_images_.images || source_images_.images)) {
+  if (gather_ && gather_->mirroredLamps().hasNoRoomFor(in_mirrors_)) {
     findImages();  // there are none any more, and what they would have brought is spread
     gather_->begin(leftLight());
     return false;

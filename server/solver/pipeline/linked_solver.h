@@ -267,7 +267,7 @@ class LinkedSolver final : public Solver {
   std::vector<std::uint32_t> looking_;             // shooters that are being looked at for it
   /// Those of which it is known, ascending.
   std::vector<std::uint32_t> tinted_;  // shooters that these are of
-  ImagedLight::Lamps lamp_images_, source_images_;
+  MirroredLamps::Lamps in_mirrors_;
   float least_imaged_ = 0.0F;           // emission of the former, at least
   std::unique_ptr<LeafGather> gather_;  // of reflected light; null: lights, and what is bright, are not measured
   double sampled_alone_ = 0.0;          // error before the last round that brought samples and no rays; 0: none did

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/log.h"
+#include "server/scene/values/leaf_opacity.h"
 #include "server/solver/math/sampling.h"
 
 namespace radiosity::solver {
@@ -133,6 +134,12 @@ std::uint32_t LeafRays::neighbourOf(const Side& side, std::uint32_t leaf) const 
 double LeafRays::areaOf(std::uint32_t value) const {
   const Side& side = sideOf(value);
   return static_cast<double>(patches_.node_area[side.first_node + value - side.first_value]);
+}
+
+double LeafRays::coveredAreaOf(std::uint32_t value) const {
+  const Side& side = sideOf(value);
+  const auto stopped = scene::stoppedByLeaf(patches_, patches_.surfaces[side.surface], value - side.first_value);
+  return stopped > 0.0F ? areaOf(value) / static_cast<double>(stopped) : 0.0;
 }
 
 double LeafRays::widthOf(std::uint32_t value) const {

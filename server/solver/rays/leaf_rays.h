@@ -43,6 +43,8 @@ class LeafRays {
   [[nodiscard]] const Side& sideOf(std::uint32_t value) const { return sides_[side_of_value_[value]]; }
   /// Unit box squared: what is covered and not buried.
   [[nodiscard]] double areaOf(std::uint32_t value) const;
+  /// The same, whatever of the light passes there: places of placeOn() lie as densely as one over it.
+  [[nodiscard]] double coveredAreaOf(std::uint32_t value) const;
   /// Its surface is flat, and all of its normals are the same to the bit.
   [[nodiscard]] bool isEven(std::uint32_t value) const { return is_even_[sideOf(value).surface]; }
   /// Edge of a leaf, unit box: of the whole texel.

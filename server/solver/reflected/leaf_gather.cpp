@@ -30,7 +30,7 @@ constexpr double kWithin = 0.2;
 constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLights = 5 * 3 + 4;
 /// Where there are mirrors: what arrives by way of them, what only they show, and what they look like.
 constexpr std::size_t kMirrorLights = 4 * 4 + 9;
-/// So large a part of memory images of lamps may take.
+/// So large a part of memory images of lamps may take, and caustics.
 constexpr std::size_t kImagesPart = 8;
 
 using Light32 = std::array<float, 4>;
@@ -91,8 +91,7 @@ void inLeaves(std::size_t leaves, const Work& work) {
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
                        std::size_t most_bytes, std::shared_ptr<const LeafRays> rays, std::span<const float> areas)
     : sights_(patches, sides, seed, std::move(rays)),
-      imaged_lamps_(sides, sights_.rays(), seed, most_bytes / kImagesPart),
-      imaged_sources_(sides, sights_.rays(), seed, most_bytes / kImagesPart),
+      mirrored_lamps_(sides, sights_.rays(), seed, most_bytes / kImagesPart),
       most_bytes_(most_bytes),
       sides_(sides),
       own_area_(areas.empty() ? leafAreas(patches, sides) : std::vector<float>()),
@@ -127,8 +126,7 @@ void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t
   const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * of_ray) : 0;
   const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
-  imaged_lamps_.setTimes(former.imaged_lamps_.times());
-  imaged_sources_.setTimes(former.imaged_sources_.times());
+  mirrored_lamps_.setTimes(former.mirrored_lamps_.times());
 }
 
 void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
@@ -154,8 +152,7 @@ void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
 void LeafGather::begin(LeftLight light) {
   light_ = std::move(light);
   if (!light_.sky_cells.empty()) sights_.tellCells();
-  imaged_lamps_.begin(std::move(light_.lamp_images), shading_);
-  imaged_sources_.begin(std::move(light_.source_images), shading_);
+  mirrored_lamps_.begin(std::move(light_.in_mirrors), shading_);
   stage_ = Stage::kTracing;
 }
 
@@ -168,7 +165,7 @@ bool LeafGather::advance(double seconds) {
       forgetShadedRays();
     }
     if (!sights_.trace(seconds)) return false;
-    if (!imaged_lamps_.advance(seconds - spent()) || !imaged_sources_.advance(seconds - spent())) return false;
+    if (!mirrored_lamps_.advance(seconds - spent())) return false;
     if (!is_weighed_) {
       weighRays();
       smoother_.emplace(sides_, area_, [this](std::uint32_t v) { return sights_.isParted(v); });
@@ -465,24 +462,23 @@ glm::dvec3 LeafGather::changeAcross(std::uint32_t value) const {
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(imaged_lamps_.times(), imaged_sources_.times(), image_noise_, has_gathered_,
-     std::vector<std::uint16_t>(counts.begin(), counts.end()), sights_.partlyInside(), noise_, smoothed_, bias_, doubt_,
-     block_noise_, escaped_, absorbed_, from_sky_, mirrored_flux_, spread_, imaged_flux_, unsolved_, unsolved_square_,
-     leaf_bias_, block_light_, side_noise_, side_light_);
+  to(mirrored_lamps_.times(), image_noise_, has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()),
+     sights_.partlyInside(), noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_,
+     mirrored_flux_, spread_, imaged_flux_, unsolved_, unsolved_square_, leaf_bias_, block_light_, side_noise_,
+     side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
   std::vector<bool> partly_inside;
-  std::array<std::uint32_t, 2> image_times{};
-  from(image_times[0], image_times[1], image_noise_, has_gathered_, counts, partly_inside, noise_, smoothed_, bias_,
-       doubt_, block_noise_, escaped_, absorbed_, from_sky_, mirrored_flux_, spread_, imaged_flux_, unsolved_,
-       unsolved_square_, leaf_bias_, block_light_, side_noise_, side_light_);
+  MirroredLamps::Times times{};
+  from(times, image_noise_, has_gathered_, counts, partly_inside, noise_, smoothed_, bias_, doubt_, block_noise_,
+       escaped_, absorbed_, from_sky_, mirrored_flux_, spread_, imaged_flux_, unsolved_, unsolved_square_, leaf_bias_,
+       block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;
-  const auto isTimes = [](std::uint32_t times) { return times > 0 && times <= ImagedLight::kMostTimes; };
-  if (!from.ok() || !std::ranges::all_of(image_times, isTimes) || counts.size() != sights_.leafCount() ||
+  if (!from.ok() || !MirroredLamps::areTimes(times) || counts.size() != sights_.leafCount() ||
       !std::ranges::all_of(counts, fits) || all * sights_.rayBytes(0) > most_bytes_ ||
       (!partly_inside.empty() && partly_inside.size() != counts.size()) ||
       (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
@@ -490,8 +486,7 @@ bool LeafGather::restore(ArchiveReader& from) {
       (!block_noise_.empty() && side_noise_.size() != sides_.size()) ||
       (has_gathered_ ? leaf_bias_.size() != counts.size() : !leaf_bias_.empty()))
     return false;
-  imaged_lamps_.setTimes(image_times[0]);
-  imaged_sources_.setTimes(image_times[1]);
+  mirrored_lamps_.setTimes(times);
   sights_.expectPartlyInside(std::move(partly_inside));
   if (all > 0) sights_.ask(counts);
   return true;

@@ -16,7 +16,7 @@
 //
 // Of a ray that a mirror reflected the leaf at the mirror counts by itself, and what is seen in it times what the
 // mirror reflects: there shooters count as well, since what they send over links does not come by way of mirrors. Lamps
-// in flat mirrors are looked for as images (ImagedLight), and not by those rays that would find them there.
+// in mirrors are looked for by other means (MirroredLamps), and not by those rays that would find them there.
 //
 // Two independent halves of the rays give two independent solutions; where their difference is worth
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
@@ -35,11 +35,11 @@
 #include "common/union_find.h"
 #include "server/solver/math/gmres.h"
 #include "server/solver/patches/passing.h"
-#include "server/solver/reflected/imaged_light.h"
 #include "server/solver/reflected/leaf_shading.h"
 #include "server/solver/reflected/leaf_sights.h"
 #include "server/solver/reflected/leaf_smoother.h"
 #include "server/solver/reflected/lost_rays.h"
+#include "server/solver/reflected/mirrored_lamps.h"
 #include "server/solver/reflected/shaded_rays.h"
 
 namespace radiosity::solver {
@@ -51,9 +51,9 @@ struct LeftLight {
   std::vector<PassingLeaf> passing;                         ///< in their order
   std::shared_ptr<const SpecularLeaves> mirrors = nullptr;  ///< as of LeafGather::reflectBy()
   std::vector<glm::vec3> lamps;                             ///< emission of light polygons; empty: no mirror needs it
-  std::vector<glm::vec3> imaged_lamps;  ///< of it, of those of `lamp_images`; empty where there are none
+  std::vector<glm::vec3> imaged_lamps;  ///< of it, of those of `in_mirrors`; empty where there are none
   /// In those mirrors: of some of `lamps`, and of lights that are no surfaces.
-  ImagedLight::Lamps lamp_images, source_images;
+  MirroredLamps::Lamps in_mirrors;
   std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
   std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
   std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
@@ -98,16 +98,14 @@ class LeafGather {
   void begin(LeftLight light);
   bool advance(double seconds);
   /// Rays are asked for that are not traced, or looks at images: advance() will take its time.
-  [[nodiscard]] bool isBehind() const {
-    return !sights_.isTraced() || imaged_lamps_.isBehind() || imaged_sources_.isBehind();
-  }
+  [[nodiscard]] bool isBehind() const { return !sights_.isTraced() || mirrored_lamps_.isBehind(); }
   [[nodiscard]] std::uint64_t raysBehind() const { return sights_.untraced(); }
-  /// Rays that the first looks at those images take that are not known.
-  [[nodiscard]] std::uint64_t looksBehind(const ImagedLight::Lamps& lamps, const ImagedLight::Lamps& sources) const {
-    return imaged_lamps_.looksFor(lamps) + imaged_sources_.looksFor(sources);
+  /// Rays that finding those lamps in mirrors takes, of which nothing is known.
+  [[nodiscard]] std::uint64_t looksBehind(const MirroredLamps::Lamps& lamps) const {
+    return mirrored_lamps_.raysFor(lamps);
   }
-  /// There was no room for what images bring: they are to be left out.
-  [[nodiscard]] bool hasNoRoomForImages() const { return imaged_lamps_.isGivenUp() || imaged_sources_.isGivenUp(); }
+  /// Where there was no room for what they bring they are to be left out.
+  [[nodiscard]] const MirroredLamps& mirroredLamps() const { return mirrored_lamps_; }
   /// Those are given up, where there are others.
   void giveUp() { sights_.giveUp(); }
 
@@ -142,10 +140,11 @@ class LeafGather {
   [[nodiscard]] const std::array<double, 3>& mirroredFlux() const { return mirrored_flux_; }
   /// Flux that mirrors reflect of images of lights that are no surfaces, as if they did so diffusely.
   [[nodiscard]] const std::array<double, 3>& spreadFlux() const { return spread_; }
-  /// Square of the noise of images of lamps, as noise().
-  [[nodiscard]] double imageNoise() const { return image_noise_; }
-  /// Looks about so many times as often at each. False: there can be no more.
-  bool refineImages(double times);
+  /// Square of the noise of lamps in mirrors, as noise().
+  [[nodiscard]] double imageNoise() const { return image_noise_[0] + image_noise_[1]; }
+  /// Looks for those more often whose noise is most, so that all of it is about `goal`. False: it is, or there can be
+  /// no more.
+  bool refineImages(double goal);
   /// Flux that leaves get of images of lights that are no surfaces.
   [[nodiscard]] const std::array<double, 3>& imagedFlux() const { return imaged_flux_; }
   /// Flux that comes straight from the sky, or by way of mirrors.
@@ -248,8 +247,11 @@ class LeafGather {
   [[nodiscard]] bool isImaged(const LeafSights::Step& step) const;
   [[nodiscard]] Light32 imagedIn(std::size_t half, const LeafSights::Step& step) const;
   [[nodiscard]] Light32 arrivesAsImage(std::size_t half, std::uint32_t lamp, std::uint32_t end) const;
+  [[nodiscard]] Light32 arrivesOtherwise(std::size_t half, std::uint32_t lamp, std::uint32_t end,
+                                         const Reflected& arrives) const;
   [[nodiscard]] Light32 imagedAt(std::size_t half, std::uint32_t end) const;
   void takeImages();
+  [[nodiscard]] double noiseOf(std::span<const glm::vec3> a, std::span<const glm::vec3> b) const;
   void spreadImages();
   void tellImages();
   [[nodiscard]] double partThroughPanes(std::size_t half, std::size_t value) const {
@@ -346,7 +348,7 @@ class LeafGather {
   void finish();
 
   LeafSights sights_;
-  ImagedLight imaged_lamps_, imaged_sources_;
+  MirroredLamps mirrored_lamps_;
   std::size_t most_bytes_;
   bool has_gathered_ = false, lacks_memory_ = false, has_mirrors_ = false;
   const std::vector<Side>& sides_;
@@ -403,10 +405,10 @@ class LeafGather {
   /// Of the rays that there are light was weighed for shading normals; what they count for that is kept.
   bool has_shaded_ = false, keeps_shaded_rays_ = false;
   std::array<std::vector<ShadedRays>, 2> shaded_rays_;  ///< by half, by side of LeafShading::sides()
-  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, image_noise_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0,
-         unsolved_square_ = 0.0;
-  std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
-  std::vector<double> block_light_;  ///< likewise, of all irradiance
+  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
+  std::array<double, 2> image_noise_{};  ///< of images, and of caustics
+  std::vector<double> block_noise_;      ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
+  std::vector<double> block_light_;      ///< likewise, of all irradiance
   std::vector<double> side_noise_, side_light_;  ///< likewise, by side
   std::vector<float> leaf_bias_;
   std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{}, mirrored_flux_{}, spread_{}, imaged_flux_{};

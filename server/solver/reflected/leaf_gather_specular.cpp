@@ -134,15 +134,17 @@ void LeafGather::followMirrors(std::size_t half, const std::vector<Light>* sourc
   }
 }
 
-/// Lamps that are seen in the mirror of a step are looked for as images.
+/// Lamps that are seen in the mirror of a step are looked for otherwise.
 bool LeafGather::isImaged(const LeafSights::Step& step) const {
-  const auto* images = imaged_lamps_.images();
-  if (images == nullptr || !SpecularStep::is(step.by)) return false;
+  if (!SpecularStep::is(step.by)) return false;
+  if (mirrored_lamps_.caustics() != nullptr) return true;
+  const auto* images = mirrored_lamps_.images();
+  if (images == nullptr) return false;
   const auto mirror = SpecularStep::of(step.by);
   return !mirror.is_again && images->isIn(mirror.leaf);
 }
 
-/// Of a step: light of a lamp that the ray found in a mirror and that leaves get as an image, without the ray.
+/// Of a step: light of a lamp that the ray found in a mirror and that leaves get without the ray.
 LeafGather::Light32 LeafGather::imagedIn(std::size_t half, const LeafSights::Step& step) const {
   if (!isImaged(step)) return {};
   const auto behind = sights_.behindPanes(half, step.next);
@@ -170,8 +172,10 @@ LeafGather::Light32 LeafGather::arrivesAsImage(std::size_t half, std::uint32_t l
   return arrives;
 }
 
-/// What imagedIn() tells of where a ray ends, or goes on: who sees that in another mirror gets no image of it.
+/// What imagedIn() tells of where a ray ends, or goes on: who sees that in another mirror gets no image of it, while
+/// paths from lamps arrive by any number of mirrors.
 LeafGather::Light32 LeafGather::imagedAt(std::size_t half, std::uint32_t end) const {
+  if (mirrored_lamps_.caustics() != nullptr) return {};
   const auto behind = sights_.behindPanes(half, end);
   if (behind < sights_.endCount()) return {};
   auto imaged = imagedIn(half, sights_.steps(half)[behind - sights_.endCount()]);
@@ -180,32 +184,57 @@ LeafGather::Light32 LeafGather::imagedAt(std::size_t half, std::uint32_t end) co
   return imaged;
 }
 
-/// What arrives of images, which is like light over links from then on.
+/// Of such a ray, of which `arrives` tells what arrives by way of mirrors: the light of a lamp that leaves get without
+/// rays.
+LeafGather::Light32 LeafGather::arrivesOtherwise(std::size_t half, std::uint32_t lamp, std::uint32_t end,
+                                                 const Reflected& arrives) const {
+  if (mirrored_lamps_.caustics() == nullptr) return arrivesAsImage(half, lamp, end);
+  const auto& light = light_.imaged_lamps[lamp];
+  const auto& part = arrives.byMirrors()[end - sights_.endCount()];
+  return {part[0] * light.x, part[1] * light.y, part[2] * light.z, 0.0F};
+}
+
+/// What arrives of lamps without rays, which is like light over links from then on.
 void LeafGather::takeImages() {
   for (auto& half : halves_) half.imaged.clear();
   spread_ = imaged_flux_ = {};
-  image_noise_ = 0.0;
-  if (imaged_lamps_.images() == nullptr && imaged_sources_.images() == nullptr) return;
+  image_noise_ = {};
+  if (!mirrored_lamps_.any()) return;
   for (auto& half : halves_) half.imaged.assign(sights_.leafCount(), glm::vec3(0.0F));
-  inBothHalves([&](std::size_t h) { imaged_sources_.addTo(h, halves_[h].imaged); });
+  inBothHalves([&](std::size_t h) { mirrored_lamps_.addSourcesTo(h, halves_[h].imaged); });
   spreadImages();
+  inBothHalves([&](std::size_t h) { mirrored_lamps_.addImagesTo(h, halves_[h].imaged); });
+  std::array<std::vector<glm::vec3>, 2> caustics;
+  inBothHalves([&](std::size_t h) {
+    caustics[h].assign(sights_.leafCount(), glm::vec3(0.0F));
+    mirrored_lamps_.addCausticsTo(h, caustics[h]);
+    auto& imaged = halves_[h].imaged;
+    for (std::uint32_t v = 0; v < imaged.size(); ++v)
+      if (light_.mirrors->isGlass(v)) imaged[v] = glm::vec3(0.0F);
+  });
+  image_noise_ = {noiseOf(halves_[0].imaged, halves_[1].imaged), noiseOf(caustics[0], caustics[1])};
   inBothHalves([&](std::size_t h) {
     auto& imaged = halves_[h].imaged;
-    imaged_lamps_.addTo(h, imaged);
     for (std::uint32_t v = 0; v < imaged.size(); ++v) {
-      if (light_.mirrors->isGlass(v)) imaged[v] = glm::vec3(0.0F);
+      imaged[v] += caustics[h][v];
       light_.irradiance[h][v] += imaged[v];
     }
   });
-  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    const auto off = 0.5F * (halves_[0].imaged[v] - halves_[1].imaged[v]);
-    image_noise_ += areaOf(v) * static_cast<double>(glm::dot(off, off));
-  }
 }
 
-bool LeafGather::refineImages(double times) {
-  const bool more_lamps = imaged_lamps_.refine(times);
-  return imaged_sources_.refine(times) || more_lamps;
+/// Square of the noise in the mean of two halves, by leaf value: sum over leaves and channels, times area.
+double LeafGather::noiseOf(std::span<const glm::vec3> a, std::span<const glm::vec3> b) const {
+  double noise = 0.0;
+  for (std::uint32_t v = 0; v < a.size(); ++v) {
+    const auto off = 0.5F * (a[v] - b[v]);
+    noise += areaOf(v) * static_cast<double>(glm::dot(off, off));
+  }
+  return noise;
+}
+
+bool LeafGather::refineImages(double goal) {
+  const auto times = [&](double noise) { return noise / std::max(0.5 * goal, 1e-300); };
+  return imageNoise() > goal && mirrored_lamps_.refine(times(image_noise_[0]), times(image_noise_[1]));
 }
 
 /// Of lights that are no surfaces rays find nothing, and no image is seen in another mirror: that reflects them as if
@@ -228,8 +257,7 @@ void LeafGather::tellImages() {
     const auto& imaged = halves_[h].imaged;
     auto& parts = shaded_part_[h];
     std::vector<glm::vec3> shaded(parts.size(), glm::vec3(0.0F));
-    imaged_lamps_.addShadedTo(h, shaded);
-    imaged_sources_.addShadedTo(h, shaded);
+    mirrored_lamps_.addShadedTo(h, shaded);
     for (std::uint32_t v = 0; v < imaged.size(); ++v) {
       const auto of_rays = gathered_[h][v];
       gathered_[h][v] += imaged[v];
@@ -282,7 +310,7 @@ void LeafGather::takeMirrors(std::size_t h) {
     if (is_pane || (first < leaves && light_.mirrors->isGlass(first))) half.at_glass[v] += part;
     if (is_pane) half.through_panes[v] += part;
     if (end < ends) return;
-    const auto imaged = arrivesAsImage(h, v, end);
+    const auto imaged = arrivesOtherwise(h, v, end, arrives);
     for (std::size_t c = 0; c < 3; ++c) {
       half.mirrored[v][c] += part * arrives.all[end - ends][c];
       half.in_mirrors[v][c] += part * (arrives.byMirrors()[end - ends][c] * half.shot[v][c] - imaged[c]);
