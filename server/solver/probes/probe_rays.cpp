@@ -262,7 +262,10 @@ std::array<glm::dvec4, kHarmonics> ProbeRays::gatherRound(std::size_t number, co
     for (std::size_t i = 0; i < together; ++i) {
       direction[i] = direction_[first + i];
       auto of_ray = radiance[from_[first + i]];
-      if (!part_.empty()) of_ray *= glm::vec4(part_[first + i], 1.0F);
+      if (!part_.empty()) {
+        const auto& part = part_[first + i];
+        of_ray *= glm::vec4(part, (part.x + part.y + part.z) / 3.0F);
+      }
       for (int c = 0; c < 4; ++c) light[static_cast<std::size_t>(c)][i] = of_ray[c];
     }
     lanes.add(unpacked(direction), light);
