@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "protocol/probes.h"
+#include "server/scene/values/probe_grid.h"
 #include "tests/service/net/running_server.h"
 #include "tests/service/net/test_client.h"
 
@@ -11,6 +12,8 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+
+static_assert(scene::kMostProbes == protocol::kMaxProbes && scene::kMostProbeGrids == protocol::kMaxProbeGrids);
 
 TEST(LightProbes, AreJsonByHttp) {
   RunningServer server;
