@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/bytes.h"
 #include "common/result.h"
 
 namespace radiosity::protocol {
@@ -34,8 +35,6 @@ struct ProbeGrid {
   std::array<double, 3> first{};                 ///< metres
   std::array<std::array<double, 3>, 3> steps{};  ///< to the next in x, y and z
   std::vector<float> values;                     ///< kProbeNumbers a probe; empty: places alone
-
-  [[nodiscard]] std::uint64_t probeCount() const { return counts[0] * counts[1] * counts[2]; }
 };
 
 struct Probes {
@@ -45,13 +44,24 @@ struct Probes {
   std::vector<ProbeGrid> grids;
 };
 
-/// {"revision", "state", "error", "grids"}; each grid with its lists where it has values.
-[[nodiscard]] std::string encodeHttpProbes(const Probes& probes);
+/// {"error", "measured", "revision", "state", "grids"}, in this order; each grid with its lists where it has values,
+/// and then `measured` has for each grid how many of its probes were measured themselves. Throws what interrupts the
+/// task (task.h), and std::bad_alloc, as the next does.
+[[nodiscard]] Bytes encodeHttpProbes(const Probes& probes);
 /// The same as bytes: "RPRB", the version 1 and the size of what follows as 32-bit numbers, JSON as of places alone,
 /// with spaces at its end, and then, from a multiple of four bytes on, the values of one grid after the other as 32-bit
 /// floats; all little-endian.
-[[nodiscard]] std::string probesBinary(const Probes& probes);
+[[nodiscard]] Bytes probesBinary(const Probes& probes);
 /// The grids of encodeHttpProbes(), without their lists.
 [[nodiscard]] Result<Probes> decodeHttpProbes(std::string_view body);
+
+/// What is told of all grids, before the first of them.
+struct ProbesHead {
+  std::uint64_t revision = 0;
+  std::vector<std::uint64_t> measured;  ///< probes, by grid
+};
+inline constexpr std::size_t kMaxProbesHeadBytes = std::size_t{1} << 18U;
+/// Of the first kMaxProbesHeadBytes of either form, with light. kBadInput: they are of neither.
+[[nodiscard]] Result<ProbesHead> decodeProbesHead(std::string_view start);
 
 }  // namespace radiosity::protocol

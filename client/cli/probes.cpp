@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "client/cli/commands.h"
@@ -24,8 +25,9 @@ Result<protocol::Probes> fetchPlaces(const Remote& remote, const ProbeOptions& o
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) {
     auto error = httpError(*reply, remote.url.text());
-    // The scene's fault, or that of what was asked for, and not the server's.
-    error.code = reply->status == 503 ? error.code : ErrorCode::kBadInput;
+    // The scene's fault, or that of what was asked for, and not the server's; a 404 of others has no code.
+    const bool is_found = reply->status == 404 && error.code == ErrorCode::kNotFound;
+    if (reply->status == 400 || reply->status == 413 || is_found) error.code = ErrorCode::kBadInput;
     return tl::unexpected(std::move(error));
   }
   auto places = protocol::decodeHttpProbes(reply->body);
@@ -35,6 +37,24 @@ Result<protocol::Probes> fetchPlaces(const Remote& remote, const ProbeOptions& o
 }
 
 double lengthOf(const std::array<double, 3>& step) { return std::hypot(step[0], step[1], step[2]); }
+
+std::string gridName(const protocol::ProbeGrid& grid) {
+  if (!grid.node) return "the whole scene";
+  return grid.name.empty() ? fmt::format("node {}", *grid.node) : oneLine(grid.name);
+}
+
+/// Into `file`, which is not committed.
+Result<protocol::ProbesHead> fetchLight(const Remote& remote, const ProbeOptions& options, client::AtomicFile& file) {
+  const std::string path = options.output.ends_with(".bin") ? "/probes.bin?" : "/probes.json?";
+  const auto reply = client::httpGetToFile(remote.http(), path + queryOf(options), file);
+  if (!reply) return tl::unexpected(reply.error());
+  if (!reply->ok()) return tl::unexpected(httpError(*reply, remote.url.text()));
+  const auto start = file.start(protocol::kMaxProbesHeadBytes);
+  if (!start) return tl::unexpected(start.error());
+  auto head = protocol::decodeProbesHead(*start);
+  if (!head) return fail(ErrorCode::kUnavailable, "the file of probes: " + head.error().text(), remote.url.text());
+  return head;
+}
 
 struct CommandOptions {
   RemoteOptions server;
@@ -78,6 +98,19 @@ Result<void> checkProbes(const ProbeOptions& options) {
   return checkOutputs({options.output});
 }
 
+Result<void> requireOwnFile(const ProbeOptions& options, const std::vector<std::string>& others) {
+  namespace fs = std::filesystem;
+  if (options.output.empty()) return {};
+  std::error_code error;
+  const auto placeOf = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, error), error); };
+  for (const auto& other : others) {
+    if (other.empty()) continue;
+    if (placeOf(other) == placeOf(options.output) || fs::equivalent(other, options.output, error))
+      return fail(ErrorCode::kBadUsage, "the file of probes would replace " + other, options.output);
+  }
+  return {};
+}
+
 Result<void> requireProbes(const Remote& remote, const ProbeOptions& options) {
   const auto places = fetchPlaces(remote, options);
   if (!places) return tl::unexpected(places.error());
@@ -85,29 +118,39 @@ Result<void> requireProbes(const Remote& remote, const ProbeOptions& options) {
 }
 
 Result<std::string> saveProbes(const Remote& remote, const ProbeOptions& options, ProgressDisplay& display) {
-  const auto places = fetchPlaces(remote, options);
-  if (!places) return tl::unexpected(places.error());
-  auto file = client::AtomicFile::create(options.output);
-  if (!file) return tl::unexpected(file.error());
-  display.showText("probes");
-  const std::string path = options.output.ends_with(".bin") ? "/probes.bin?" : "/probes.json?";
-  const auto reply = client::httpGetToFile(remote.http(), path + queryOf(options), *file);
-  display.clear();
-  if (!reply) return tl::unexpected(reply.error());
-  if (!reply->ok()) return tl::unexpected(httpError(*reply, remote.url.text()));
-  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
-  return options.output + "\n" + probesText(*places);
+  constexpr int kAttempts = 3;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const auto places = fetchPlaces(remote, options);
+    if (!places) return tl::unexpected(places.error());
+    auto file = client::AtomicFile::create(options.output);
+    if (!file) return tl::unexpected(file.error());
+    display.showText("probes");
+    const auto head = fetchLight(remote, options, *file);
+    display.clear();
+    if (!head) return tl::unexpected(head.error());
+    if (head->revision != places->revision) continue;  // an edit in between: these might be other grids
+    if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+    return options.output + "\n" + probesText(*places, head->measured);
+  }
+  return fail(ErrorCode::kBusy, "the scene is being changed faster than its probes can be fetched; try again",
+              remote.url.text());
 }
 
-std::string probesText(const protocol::Probes& probes) {
+std::string probesText(const protocol::Probes& probes, const std::vector<std::uint64_t>& measured) {
   std::string text;
-  for (const auto& grid : probes.grids) {
-    const auto name = !grid.node          ? std::string("the whole scene")
-                      : grid.name.empty() ? fmt::format("node {}", *grid.node)
-                                          : oneLine(grid.name);
+  for (std::size_t g = 0; g < probes.grids.size(); ++g) {
+    const auto& grid = probes.grids[g];
+    const auto name = gridName(grid);
     text +=
-        fmt::format("{}: {} x {} x {} probes, {:.3g} x {:.3g} x {:.3g} m apart\n", name, grid.counts[0], grid.counts[1],
+        fmt::format("{}: {} x {} x {} probes, {:.3g} x {:.3g} x {:.3g} m apart", name, grid.counts[0], grid.counts[1],
                     grid.counts[2], lengthOf(grid.steps[0]), lengthOf(grid.steps[1]), lengthOf(grid.steps[2]));
+    const auto all = grid.counts[0] * grid.counts[1] * grid.counts[2];
+    const auto seen = g < measured.size() ? std::min(measured[g], all) : all;
+    if (seen < all)
+      text += fmt::format("; {} inside solids or behind walls have {}", all - seen,
+                          seen > 0 ? "the light of those beside them" : "no light");
+    text += "\n";
+    if (seen == 0) warn(name + ": all probes lie inside solids or behind walls, and are black");
   }
   return text;
 }

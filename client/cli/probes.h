@@ -2,8 +2,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/cli/exit_code.h"
 #include "client/cli/remote.h"
@@ -21,13 +23,17 @@ void addProbeOptions(CLI::App& command, ProbeOptions& options, const char* spaci
 
 /// kBadUsage: the file has another ending, or there is a spacing and no file.
 [[nodiscard]] Result<void> checkProbes(const ProbeOptions& options);
+/// kBadUsage: the file of probes is one of these, which are read or written, too; empty paths are none.
+[[nodiscard]] Result<void> requireOwnFile(const ProbeOptions& options, const std::vector<std::string>& others);
 /// Whether the server's scene has these grids, before anybody waits for its light.
 [[nodiscard]] Result<void> requireProbes(const Remote& remote, const ProbeOptions& options);
-/// Writes the file, whole or not at all. Returns what to tell people: probesText().
+/// Writes the file, whole or not at all, of one revision. Returns what to tell people: probesText(). kBusy: edits come
+/// faster than files.
 [[nodiscard]] Result<std::string> saveProbes(const Remote& remote, const ProbeOptions& options,
                                              ProgressDisplay& display);
 
-/// A line for each grid. Pure.
-[[nodiscard]] std::string probesText(const protocol::Probes& probes);
+/// A line for each grid, with how many probes of it were not measured; warns of one of which none was. `measured`:
+/// protocol::ProbesHead; a grid that it lacks was measured wholly.
+[[nodiscard]] std::string probesText(const protocol::Probes& probes, const std::vector<std::uint64_t>& measured);
 
 }  // namespace radiosity::cli

@@ -157,14 +157,22 @@ Result<SceneKind> sceneKind(const std::string& path) {
   return fail(ErrorCode::kBadInput, notGltf(path), path);
 }
 
-Result<bool> hasExternalFiles(const std::string& path) {
+Result<std::vector<std::string>> externalFiles(const std::string& path) {
   const auto document = readGltf(path);
   if (!document) return tl::unexpected(document.error());
-  for (const auto* list : kLists)
-    if (const auto* entries = listAt(*document, list);
-        entries != nullptr && std::any_of(entries->begin(), entries->end(), isExternal))
-      return true;
-  return false;
+  std::vector<std::string> files;
+  for (const auto* list : kLists) {
+    const auto* entries = listAt(*document, list);
+    if (entries == nullptr) continue;
+    for (const auto& entry : *entries)
+      if (isExternal(entry))
+        files.push_back((fs::path(path).parent_path() / percentDecode(entry["uri"].get<std::string>())).string());
+  }
+  return files;
+}
+
+Result<bool> hasExternalFiles(const std::string& path) {
+  return externalFiles(path).map([](const auto& files) { return !files.empty(); });
 }
 
 Result<std::string> inlineExternalFiles(const std::string& path) {

@@ -17,6 +17,8 @@ enum class SceneKind { kGlb, kGltf };
 [[nodiscard]] Result<SceneKind> sceneKind(const std::string& path);
 
 /// True where a buffer or image of the .gltf lives in another file.
+/// The files beside a .gltf that it names, whether or not they are there.
+[[nodiscard]] Result<std::vector<std::string>> externalFiles(const std::string& path);
 [[nodiscard]] Result<bool> hasExternalFiles(const std::string& path);
 
 /// The .gltf's text with every external buffer and image replaced by a data URI. Only files inside the .gltf's folder

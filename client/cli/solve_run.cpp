@@ -88,8 +88,22 @@ class Solve {
       if (!external) return tl::unexpected(external.error());
       by_path_ = *external && !needsKtx2(options_.scene);
     }
-    return checkOutputs(
-        {is_folder ? "" : options_.output, options_.report, options_.png, options_.measure.csv, options_.measure.json});
+    const std::vector<std::string> outputs{is_folder ? "" : options_.output, options_.report, options_.png,
+                                           options_.measure.csv, options_.measure.json};
+    if (auto ready = checkOutputs(outputs); !ready) return ready;
+    return checkProbesFile(outputs, *kind);
+  }
+
+  /// What else has names that may end with .json or .bin.
+  [[nodiscard]] Result<void> checkProbesFile(std::vector<std::string> others, SceneKind kind) const {
+    if (options_.probes.output.empty()) return {};
+    others.push_back(options_.scene);
+    if (kind == SceneKind::kGltf) {
+      const auto files = externalFiles(options_.scene);
+      if (!files) return tl::unexpected(files.error());
+      others.insert(others.end(), files->begin(), files->end());
+    }
+    return requireOwnFile(options_.probes, others);
   }
 
   Result<void> findServer() {

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -106,6 +107,18 @@ Result<void> AtomicFile::write(std::span<const std::uint8_t> bytes) {
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
   return {};
+}
+
+Result<std::string> AtomicFile::start(std::size_t most) const {
+  RAD_CHECK(descriptor_ >= 0);
+  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(most, size_bytes_)), '\0');
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t count = pread(descriptor_, text.data() + done, text.size() - done, static_cast<off_t>(done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return failErrno("what was written cannot be read", path_, count < 0 ? errno : EIO);
+    done += static_cast<std::size_t>(count);
+  }
+  return text;
 }
 
 Result<void> AtomicFile::write(std::string_view text) {

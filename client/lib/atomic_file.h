@@ -2,6 +2,7 @@
 // by one thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -29,6 +30,9 @@ class AtomicFile {
 
   /// Flushes to the disk and renames over `path`. Nothing may be written after it.
   [[nodiscard]] Result<void> commit();
+
+  /// At most so many of the first bytes that were written; before commit(). Errors name the path.
+  [[nodiscard]] Result<std::string> start(std::size_t most) const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::uint64_t sizeBytes() const { return size_bytes_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <new>
 #include <utility>
 
 #include "common/log.h"
@@ -263,20 +264,27 @@ Result<engine::ProbeRequest> queryProbes(const HttpRequest& request) {
   return wanted;
 }
 
-/// `write` makes the body.
-void tellProbes(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done, std::string_view type,
-                std::string (*write)(const protocol::Probes&)) {
-  const auto wanted = queryProbes(request);
-  if (!wanted) return done(errorResponse(wanted.error()));
-  const auto encode = [write](Result<engine::ProbeReport> report) -> Result<SharedBytes> {
-    if (report) {
-      const auto text = write(toProbes(std::move(*report)));
-      return std::make_shared<const Bytes>(text.begin(), text.end());
-    }
+using WriteProbes = Bytes (*)(const protocol::Probes&);
+
+Result<SharedBytes> probesBody(Result<engine::ProbeReport> report, WriteProbes write) {
+  if (!report) {
     auto error = report.error();
     if (error.where == "spacing") error.where = "?spacing=";
     return tl::unexpected<Error>(std::move(error));
-  };
+  }
+  try {
+    return std::make_shared<const Bytes>(write(toProbes(std::move(*report))));
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kTooLarge, "the server's memory does not hold the file of these probes", "?spacing=");
+  }
+}
+
+/// `write` makes the body.
+void tellProbes(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done, std::string_view type,
+                WriteProbes write) {
+  const auto wanted = queryProbes(request);
+  if (!wanted) return done(errorResponse(wanted.error()));
+  const auto encode = [write](Result<engine::ProbeReport> report) { return probesBody(std::move(report), write); };
   hub->engine().probes(*wanted, clientOf(request),
                        hub->fromEngineMade<engine::ProbeReport>(encode, [done, type](const Result<SharedBytes>& bytes) {
                          done(bytes ? file(*bytes, type) : errorResponse(bytes.error()));
@@ -288,6 +296,8 @@ void getProbesJson(const std::shared_ptr<Hub>& hub, HttpRequest& request, const 
 }
 
 void getProbesBinary(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  if (queryText(request, "light", "true") == "false")
+    return done(errorResponse({ErrorCode::kBadInput, "places alone are told by /probes.json", "?light="}));
   tellProbes(hub, request, done, "application/octet-stream", &protocol::probesBinary);
 }
 

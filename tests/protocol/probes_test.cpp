@@ -26,8 +26,12 @@ Probes someProbes() {
   return {3, "converged", 0.02, {grid}};
 }
 
+std::string stringOf(const Bytes& bytes) { return {bytes.begin(), bytes.end()}; }
+std::string textOf(const Probes& probes) { return stringOf(encodeHttpProbes(probes)); }
+std::string bytesOf(const Probes& probes) { return stringOf(probesBinary(probes)); }
+
 TEST(ProbesJson, HasListsOfAllProbesOneAfterTheOther) {
-  const auto parsed = json::parse(encodeHttpProbes(someProbes()));
+  const auto parsed = json::parse(textOf(someProbes()));
   EXPECT_EQ(parsed["revision"], 3);
   const auto& grid = parsed["grids"][0];
   EXPECT_EQ(grid["node"], 7);
@@ -48,7 +52,7 @@ TEST(ProbesJson, OfPlacesAloneHasNoListsAndIsReadBack) {
   probes.grids[0].values.clear();
   probes.grids.push_back(probes.grids[0]);
   probes.grids[1].node.reset();
-  const auto text = encodeHttpProbes(probes);
+  const auto text = textOf(probes);
   EXPECT_FALSE(json::parse(text)["grids"][0].contains("light"));
   const auto read = decodeHttpProbes(text);
   ASSERT_TRUE(read) << read.error().text();
@@ -64,14 +68,14 @@ TEST(ProbesJson, IsJsonWhateverTheNumbers) {
   auto probes = someProbes();
   probes.grids[0].values[0] = std::numeric_limits<float>::quiet_NaN();
   probes.grids[0].values[1] = std::numeric_limits<float>::infinity();
-  const auto parsed = json::parse(encodeHttpProbes(probes));
+  const auto parsed = json::parse(textOf(probes));
   EXPECT_EQ(parsed["grids"][0]["light"][0], 0.0);
   EXPECT_GT(parsed["grids"][0]["light"][1], 1e38);
 }
 
 TEST(ProbesJson, ThatIsWrongIsRefusedByItsPlace) {
   const auto refusedFor = [](const std::string& pointer, const json& value) {
-    auto parsed = json::parse(encodeHttpProbes(someProbes()));
+    auto parsed = json::parse(textOf(someProbes()));
     parsed[json::json_pointer(pointer)] = value;
     const auto read = decodeHttpProbes(parsed.dump());
     ASSERT_FALSE(read) << pointer;
@@ -81,14 +85,29 @@ TEST(ProbesJson, ThatIsWrongIsRefusedByItsPlace) {
   refusedFor("/grids", 3);
   refusedFor("/grids/0/counts", json({2, 1}));
   refusedFor("/grids/0/counts", json({2, 1, 0}));
+  refusedFor("/grids/0/counts", json({2, 1.5, 1}));
   refusedFor("/grids/0/first", "here");
   refusedFor("/grids/0/steps", json({{1, 2, 3}, {1, 2, 3}}));
   refusedFor("/grids/0/steps/2", json({1, 2}));
 }
 
+TEST(ProbesHead, IsReadFromTheStartOfEitherForm) {
+  auto probes = someProbes();
+  probes.grids[0].values[kProbeNumbers - 1] = 0.0F;
+  probes.grids.push_back(probes.grids[0]);
+  probes.grids[1].values[2 * kProbeNumbers - 1] = 0.0F;
+  for (const auto& file : {textOf(probes), bytesOf(probes)}) {
+    const auto head = decodeProbesHead(std::string_view(file).substr(0, 1000));
+    ASSERT_TRUE(head) << head.error().text();
+    EXPECT_EQ(head->revision, 3U);
+    EXPECT_EQ(head->measured, (std::vector<std::uint64_t>{1, 2}));
+  }
+  for (const char* wrong : {"", "RPRB", "{}", "RPRB\1\1\1\1\1\1\1\1{"}) EXPECT_FALSE(decodeProbesHead(wrong)) << wrong;
+}
+
 TEST(ProbesBinary, HasAHeaderOfJsonAndThenFloats) {
   const auto probes = someProbes();
-  const auto bytes = probesBinary(probes);
+  const auto bytes = bytesOf(probes);
   ASSERT_EQ(bytes.substr(0, 4), "RPRB");
   std::uint32_t version = 0, size = 0;
   std::memcpy(&version, bytes.data() + 4, 4);

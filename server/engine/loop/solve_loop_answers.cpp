@@ -52,7 +52,12 @@ std::vector<Image> displayPages(QuantityPages radiosity) {
   return display;
 }
 
+double statedError(const LitScene& lit) { return lit.showsOwnLight() ? lit.shownError() : lit.solver().error().total; }
+
 }  // namespace
+
+/// Light on finer texels is not shown before it is as good, and not measured either.
+const LitScene& SolveLoop::measuredScene() const { return coarser_ && !lit_->showsOwnLight() ? *coarser_ : *lit_; }
 
 void SolveLoop::sceneText(Callback<SceneText> done) {
   askOf<SceneText>(Needs::kScene, 0, std::move(done), [this]() -> Result<SceneText> {
@@ -154,34 +159,32 @@ void SolveLoop::snapshot(SnapshotRequest request, Client client, Callback<Snapsh
 
 void SolveLoop::measure(MeasureRequest request, Client client, Callback<MeasureReport> done) {
   askLong<MeasureReport>(client, std::move(done), [this, request = std::move(request)]() -> Result<MeasureReport> {
-    MeasureReport report;
-    const auto parts = fromSolveThread([this, request, &report]() -> Result<PlaneParts> {
-      // Light on finer texels is not shown before it is as good, and not measured either.
-      const auto& lit = coarser_ && !lit_->showsOwnLight() ? *coarser_ : *lit_;
-      report.revision = revision_;
-      report.state = state_;
-      report.error = lit.showsOwnLight() ? lit.shownError() : lit.solver().error().total;
-      return readPlanes(lit, request);
+    // By value: whoever is interrupted does not wait for the look.
+    auto found = fromSolveThread([this, request]() -> Result<std::pair<MeasureReport, PlaneParts>> {
+      const auto& lit = measuredScene();
+      auto parts = readPlanes(lit, request);
+      if (!parts) return tl::unexpected<Error>(parts.error());
+      return std::pair(MeasureReport{revision_, state_, statedError(lit), {}}, std::move(*parts));
     });
-    if (!parts) return tl::unexpected<Error>(parts.error());
-    report.planes = measurePlanes(*parts, request);
-    return report;
+    if (!found) return tl::unexpected<Error>(found.error());
+    found->first.planes = measurePlanes(found->second, request);
+    return std::move(found->first);
   });
 }
 
 void SolveLoop::probes(ProbeRequest request, Client client, Callback<ProbeReport> done) {
   askLong<ProbeReport>(client, std::move(done), [this, request]() -> Result<ProbeReport> {
-    ProbeReport report;
-    const auto parts = fromSolveThread([this, request, &report]() -> Result<ProbeParts> {
-      const auto& lit = coarser_ && !lit_->showsOwnLight() ? *coarser_ : *lit_;
-      report.revision = revision_;
-      report.state = state_;
-      report.error = lit.showsOwnLight() ? lit.shownError() : lit.solver().error().total;
-      return readProbes(lit, request);
+    auto found = fromSolveThread([this, request]() -> Result<std::pair<ProbeReport, ProbeParts>> {
+      const auto& lit = measuredScene();
+      auto parts = readProbes(lit, request);
+      if (!parts) return tl::unexpected<Error>(parts.error());
+      return std::pair(ProbeReport{revision_, state_, statedError(lit), {}}, std::move(*parts));
     });
-    if (!parts) return tl::unexpected(parts.error());
-    report.grids = request.light ? probes_.light(*parts) : ProbeKeeper::places(*parts);
-    return report;
+    if (!found) return tl::unexpected<Error>(found.error());
+    auto grids = request.light ? probes_.light(found->second) : ProbeKeeper::places(found->second);
+    if (!grids) return tl::unexpected<Error>(grids.error());
+    found->first.grids = std::move(*grids);
+    return std::move(found->first);
   });
 }
 

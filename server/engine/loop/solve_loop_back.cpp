@@ -46,6 +46,7 @@ Result<PatchOutcome> SolveLoop::goBack(scene::EditedDocument edited, const Scene
   if (!worth_keeping) former_.reset();
   ++went_back_;
   if (!keeps_layout) publisher_.reset();
+  probes_.letGo();
   renderer_lost_ = renderer_lost_ && settling_;
   if (state_ == SolveState::kFailed) state_ = SolveState::kSolving;  // that was the other's solve
   const bool taken = takeInLight([&] {

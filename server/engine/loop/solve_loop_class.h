@@ -276,6 +276,8 @@ class SolveLoop final : public Engine {
   /// True: taken, or not to be had at all.
   [[nodiscard]] bool takeCheckpoint();
 
+  /// What planes and probes are measured in; there is a scene.
+  [[nodiscard]] const LitScene& measuredScene() const;
   /// Nothing: pages must be made for it, and may not be.
   [[nodiscard]] std::optional<Result<Texel>> readTexel(const TexelRequest& request, bool may_make);
   void answerTexels();  ///< all that wait for pages
@@ -290,7 +292,7 @@ class SolveLoop final : public Engine {
   Listeners listeners_;
   Watches watches_;
 
-  // thread of long work only
+  // thread of long work only, but for what probes_ says
   std::unique_ptr<gpu::ViewRenderer> view_;
   ProbeKeeper probes_;
   std::weak_ptr<const Bytes> glb_;                    ///< the last that was made, while it is being sent

@@ -28,6 +28,7 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
     return affected;
   }
   if (!keeps_layout) publisher_.reset();
+  probes_.letGo();
   renderer_lost_ = renderer_lost_ && upload == Upload::kNever;  // or else it took the scene
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
   disposer_.dispose(std::exchange(former_, nullptr));

@@ -271,6 +271,7 @@ void SolveLoop::unload(SolveState state) {
   former_.reset();
   lit_.reset();
   retired_.reset();
+  probes_.letGo();
   as_restored_ = false;
   state_ = state;
   owes_pages_.reset();

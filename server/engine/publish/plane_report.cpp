@@ -1,13 +1,12 @@
 #include "server/engine/publish/plane_report.h"
 
-#include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <string>
 #include <utility>
 
 #include "common/task.h"
+#include "server/engine/publish/stated_error.h"
 #include "server/scene/import/import_planes.h"
 #include "server/scene/values/daylight.h"
 #include "server/solver/math/sampling.h"
@@ -24,39 +23,6 @@ constexpr double kWantedError = 0.01;
 /// daylight does where nothing is said.
 constexpr double kOutsideLux = 10'000.0, kGround = 0.2;
 constexpr double kPercent = 100.0;
-
-/// In a name that is told with a measurement.
-constexpr std::size_t kMostName = 100;
-
-/// What smoothing has in common in both halves, as part of all light.
-double commonPart(const LitScene& lit, const std::vector<glm::vec3>& light) {
-  const auto common = lit.solver().commonErrorSquared();
-  const auto& area = lit.patches().node_area;
-  double squares = 0.0, all = 0.0;
-  for (std::size_t n = 0; n < common.size(); ++n) {
-    squares += static_cast<double>(area[n] * (common[n].x + common[n].y + common[n].z));
-    all += static_cast<double>(area[n] * glm::dot(light[n], light[n]));
-  }
-  return all > 0.0 ? std::sqrt(squares / all) : 0.0;
-}
-
-/// Light that is unshot, texels that are too wide, and smoothing make an error that no halves differ by.
-double systematicPart(const LitScene& lit, const std::vector<glm::vec3>& light) {
-  const auto& solver = lit.solver();
-  const bool is_known = lit.settings().method != Method::kPaper && !lit.isStale() && lit.showsOwnLight() &&
-                        !solver.isRepairing() && !solver.isUnsettled() && solver.rounds() > 0;
-  if (!is_known) return 1.0;
-  return std::min(1.0, std::hypot(solver.error().residual, solver.error().variation, commonPart(lit, light)));
-}
-
-/// Cut between characters.
-std::string shortName(std::string name) {
-  if (name.size() <= kMostName) return name;
-  std::size_t end = kMostName;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
-  name.resize(end);
-  return name;
-}
 
 /// Unit boxes from the scene, beyond which rays are none.
 constexpr double kFar = 1e9;

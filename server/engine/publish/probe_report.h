@@ -1,9 +1,11 @@
 // Grids of probes: what they need is read on the solve thread, and their light is told on any other.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "common/result.h"
@@ -21,6 +23,7 @@ struct ProbeParts {
   scene::PatchMaterials materials;
   solver::LightSources sources;
   std::vector<glm::vec3> irradiance, difference;  ///< lux, by node of level 0; what the halves of the solve differ by
+  double systematic = 1.0;                        ///< systematicPart()
   std::uint64_t seed = 1;
 };
 
@@ -28,29 +31,39 @@ struct ProbeParts {
 /// where none is asked for.
 [[nodiscard]] Result<ProbeParts> readProbes(const LitScene& lit, const ProbeRequest& request);
 
-/// Keeps what probes see from one time to the next. One thread outside of the calls.
+/// Keeps what probes see from one time to the next. One thread outside of the calls, but for letGo().
 class ProbeKeeper {
  public:
   /// Of all grids of `parts`. Cost: a ray tree and ProbeSet of what is new, where only light differs a pass over the
-  /// rays. On all cores, with interruption points. The same bits whatever was asked before.
-  [[nodiscard]] std::vector<ProbeGridLight> light(const ProbeParts& parts);
+  /// rays. On all cores, with interruption points: what was found by then stays. The same bits whatever was asked
+  /// before. kTooLarge: mirrors send the rays of so many probes on too often.
+  [[nodiscard]] Result<std::vector<ProbeGridLight>> light(const ProbeParts& parts);
+  /// The scene is another: what is kept of the former goes, now or at the end of light(). Any thread; waits for none.
+  void letGo();
   /// Their places alone.
   [[nodiscard]] static std::vector<ProbeGridLight> places(const ProbeParts& parts);
 
  private:
   struct Kept {
     scene::ProbeGrid grid;
-    std::uint32_t rays = 0;
-    std::uint64_t key = 0;
+    std::size_t in_all = 0;  ///< probes of all grids then, by which rays and memory are shared out
     std::unique_ptr<solver::ProbeSet> set;
   };
   void takeScene(const std::shared_ptr<const scene::PatchScene>& patches);
-  [[nodiscard]] Kept take(const Kept& wanted, const solver::PlaceLight& light, const scene::PatchScene& patches);
+  void dropOthers(const ProbeParts& parts, std::size_t in_all, const solver::PlaceLight& light);
+  [[nodiscard]] solver::ProbeSet& setOf(const scene::ProbeGrid& grid, std::size_t in_all, const ProbeParts& parts,
+                                        const solver::PlaceLight& light);
+  [[nodiscard]] Result<std::vector<ProbeGridLight>> lightOf(const ProbeParts& parts);
+  void clear();
+  void clearFormer();
 
+  std::atomic<bool> is_former_ = false;  ///< what is kept is of a scene that is there no more
+  std::mutex mutex_;                     ///< of all that follows
   // Of the scene that the rays are of; in the order in which each refers to those before.
   std::shared_ptr<const scene::PatchScene> patches_;
   std::unique_ptr<std::vector<solver::Side>> sides_;
   std::shared_ptr<const solver::LeafRays> rays_;
+  std::uint64_t seed_ = 0;
   std::vector<Kept> kept_;
 };
 

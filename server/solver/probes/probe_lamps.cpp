@@ -17,6 +17,8 @@ namespace {
 
 /// Probes from which a thread looks at a time.
 constexpr std::size_t kLookersAPart = 32;
+/// Of a distance, unit box: at a lamp's middle.
+constexpr double kLeastSquare = 1e-12;
 using Rounds = RoundHarmonics<ProbeLamps::kRounds>;
 
 /// The lamps and sources of a scene one after the other.
@@ -104,6 +106,14 @@ void addAll(const Looker& from, std::uint32_t emitter, const glm::dvec3& light, 
       sums[r][h] += light * (rounds[r].seen[h] + part * (exact[h] - rounds[r].all[h]));
 }
 
+/// Of a source: a hundredth of what its intensity would bring. The middle of a disc may lie outside of a spot's cone,
+/// or of a range, where other points do not, and the chance of what brings light must not be 0. All of a polygon faces
+/// the way its middle does.
+double leastWeight(const glm::dvec3& place, const LampGlimpse& middle) {
+  const auto way = middle.point - place;
+  return 0.01 / std::max(kLeastSquare, glm::dot(way, way));
+}
+
 /// Of very many lamps some, drawn by what the middle of each would bring.
 void addSome(const Looker& from, std::span<const ProbeEmitter> lamps, std::uint32_t count, std::uint64_t key,
              Rounds& sums) {
@@ -111,8 +121,7 @@ void addSome(const Looker& from, std::span<const ProbeEmitter> lamps, std::uint3
   double all = 0.0;
   for (const auto& lamp : lamps) {
     const auto middle = from.emitters.glimpseOf(lamp.index, from.place, {0.5, 0.5});
-    // Of those whose middle is behind the horizon other points may be before it.
-    const double least = from.emitters.isPolygon(lamp.index) ? 0.01 * from.emitters.polygon(lamp.index).area : 0.0;
+    const double least = from.emitters.isPolygon(lamp.index) ? 0.0 : leastWeight(from.place, middle);
     up_to.push_back(all += std::max(middle.weight, least) * (lamp.light.x + lamp.light.y + lamp.light.z));
   }
   for (std::uint32_t r = 0; r < sums.size() && all > 0.0; ++r) {
@@ -135,9 +144,10 @@ void addSome(const Looker& from, std::span<const ProbeEmitter> lamps, std::uint3
 
 }  // namespace
 
+/// A third of the memory is for those of lamps that were switched off.
 std::size_t ProbeLamps::mostColumns() const {
-  const auto bytes = sizeof(Coefficients) * std::max<std::size_t>(1, places_.size());
-  return std::clamp<std::size_t>(kMostBytes / bytes, 1, kMostColumns);
+  const auto bytes = sizeof(Coefficients) * std::max<std::size_t>({1, places_.size(), in_all_});
+  return std::clamp<std::size_t>(kMostBytes * 2 / 3 / bytes, 1, kMostColumns);
 }
 
 /// Each lamp by itself where there are few. Of more those of one colour shine together, as panels in a ceiling do, and
@@ -199,7 +209,7 @@ void ProbeLamps::update(const PlaceLight& light) {
   }
   // What is left was switched off, or moved; half as much may be kept for its return.
   std::ranges::move(columns_, std::back_inserter(spare_));
-  while (spare_.size() > mostColumns() / 2) spare_.erase(spare_.begin());
+  while (spare_.size() > mostSpare()) spare_.erase(spare_.begin());
   columns_ = std::move(next);
 }
 

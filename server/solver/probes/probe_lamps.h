@@ -30,8 +30,10 @@ class ProbeLamps {
   /// Points of a lamp that each of them looks at.
   static constexpr std::uint32_t kLooks = 4;
 
-  /// `places`: unit box. The same key gives the same bits, whatever the number of threads.
-  ProbeLamps(std::vector<glm::dvec3> places, std::uint64_t key) : places_(std::move(places)), key_(key) {}
+  /// `places`: unit box. `in_all`: probes of all that share kMostBytes. The same key gives the same bits, whatever the
+  /// number of threads.
+  ProbeLamps(std::vector<glm::dvec3> places, std::uint64_t key, std::size_t in_all)
+      : places_(std::move(places)), key_(key), in_all_(in_all) {}
 
   /// Takes the lamps of `light`, of the same scene, in. Cost: kRounds kLooks shadow rays a probe for each lamp that is
   /// new, or was moved; of more than kFew lamps in one group kDraws of them in each round instead, drawn by what they
@@ -46,7 +48,7 @@ class ProbeLamps {
   /// Of a group, lamps that are looked at each by itself.
   static constexpr std::size_t kFew = 16;
   static constexpr std::uint32_t kDraws = 16;
-  /// Of all columns.
+  /// Of all columns of `in_all` probes, those of lamps that were switched off included; one column there may be always.
   static constexpr std::size_t kMostBytes = std::size_t{128} << 20, kMostColumns = 32;
 
   /// Mean and variance, by channel, of each coefficient.
@@ -61,6 +63,7 @@ class ProbeLamps {
     std::vector<ProbeEmitter> emitters;
   };
   [[nodiscard]] std::size_t mostColumns() const;
+  [[nodiscard]] std::size_t mostSpare() const { return mostColumns() / 2; }
   [[nodiscard]] std::vector<Group> groupsOf(const PlaceLight& light) const;
   [[nodiscard]] std::optional<Column> known(std::uint64_t key);
   void look(const PlaceLight& light, Group& group) const;
@@ -68,6 +71,7 @@ class ProbeLamps {
 
   std::vector<glm::dvec3> places_;
   std::uint64_t key_;
+  std::size_t in_all_;
   std::vector<Column> columns_;
   std::vector<Column> spare_;  ///< of lamps that were switched off last
   std::uint64_t taken_ = 0;

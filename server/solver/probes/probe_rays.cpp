@@ -1,6 +1,7 @@
 #include "server/solver/probes/probe_rays.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
@@ -75,7 +76,7 @@ class HarmonicLanes {
   std::array<std::array<Lanes, 4>, kHarmonics> sums_{};
 };
 
-/// What rays remember: a leaf, a lamp that a mirror shows there, or a cell of the sky.
+/// What rays remember: a leaf, a leaf with the lamp there, which only mirrors show, or a cell of the sky.
 class Sources {
  public:
   explicit Sources(const PlaceLight& light)
@@ -85,8 +86,9 @@ class Sources {
   [[nodiscard]] std::uint32_t leaf(std::uint32_t value) const {
     return LeafRays::isSky(value) ? leaves_ + lamps_ + value - LeafRays::kSky : value;
   }
-  [[nodiscard]] bool hasLamp(std::uint32_t value) const { return value < lamps_; }
-  [[nodiscard]] std::uint32_t lamp(std::uint32_t value) const { return leaves_ + value; }
+  [[nodiscard]] std::uint32_t inMirror(std::uint32_t value) const {
+    return value < lamps_ ? leaves_ + value : leaf(value);
+  }
   [[nodiscard]] std::size_t count() const { return std::size_t{leaves_} + lamps_ + SkyCells::kCount; }
 
  private:
@@ -123,22 +125,50 @@ struct LobeSums {
 struct ProbeRays::Part {
   std::vector<ProbeSight> sights;
   std::vector<std::uint32_t> from, direction, counts;  ///< counts: by probe and round
-  std::vector<glm::vec3> part;
-  LobeSums lobes;  ///< of the probe that is being traced
+  std::vector<glm::vec3> part;                         ///< empty: all of the light, so far
+  LobeSums lobes;                                      ///< of the probe that is being traced
+
+  void add(std::uint32_t which, const glm::dvec3& way, const glm::dvec3& left) {
+    if (left != glm::dvec3(1.0)) part.resize(from.size(), glm::vec3(1.0F));
+    if (left != glm::dvec3(1.0) || !part.empty()) part.emplace_back(left);
+    from.push_back(which);
+    direction.push_back(packed(way));
+  }
 };
 
 std::uint64_t ProbeRays::mirrorKeyOf(const PlaceLight& light) {
   return light.mirrors() != nullptr ? mixKeys(light.mirrors()->key(), 1) : 0;
 }
 
-ProbeRays::ProbeRays(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint32_t rays, std::uint64_t key)
+ProbeRays::ProbeRays(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint32_t rays, std::uint64_t key,
+                     std::size_t most_ends)
     : rays_(rays), mirror_key_(mirrorKeyOf(light)) {
+  constexpr std::uint32_t kStep = kRounds * geometry::kPacket;
+  while (!cast(light, places, key, most_ends)) {
+    if (rays_ <= kLeastRays) {
+      rays_ = 0;
+      return;
+    }
+    rays_ = std::max(kLeastRays, rays_ / 2 / kStep * kStep);
+  }
+}
+
+/// False: there are more ends than that. Whether there are does not depend on which threads find them.
+bool ProbeRays::cast(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint64_t key,
+                     std::size_t most_ends) {
   std::vector<Part> parts((places.size() + kProbesAPart - 1) / kProbesAPart);
+  std::atomic<std::size_t> ends = 0;
   inTurns(parts.size(), [&](std::size_t p) {
     const auto end = std::min(places.size(), (p + 1) * kProbesAPart);
-    for (auto i = p * kProbesAPart; i < end; ++i) trace(light, places[i], mixKeys(key, i), parts[p]);
+    for (auto i = p * kProbesAPart; i < end && ends <= most_ends; ++i) {
+      const auto before = parts[p].from.size();
+      trace(light, places[i], mixKeys(key, i), parts[p]);
+      ends += parts[p].from.size() - before;
+    }
   });
+  if (ends > most_ends) return false;
   keep(std::move(parts));
+  return true;
 }
 
 void ProbeRays::keep(std::vector<Part> parts) {
@@ -146,15 +176,15 @@ void ProbeRays::keep(std::vector<Part> parts) {
   for (const auto& part : parts) kept += part.from.size();
   from_.reserve(kept);
   direction_.reserve(kept);
-  bool has_parts = false;
-  for (const auto& part : parts)
-    has_parts = has_parts || std::ranges::any_of(part.part, [](const auto& of) { return of != glm::vec3(1.0F); });
+  const bool has_parts = std::ranges::any_of(parts, [](const Part& part) { return !part.part.empty(); });
+  if (has_parts) part_.reserve(kept);
   first_.push_back(0);
   for (auto& part : parts) {
     sights_.insert(sights_.end(), part.sights.begin(), part.sights.end());
     from_.insert(from_.end(), part.from.begin(), part.from.end());
     direction_.insert(direction_.end(), part.direction.begin(), part.direction.end());
-    if (has_parts) part_.insert(part_.end(), part.part.begin(), part.part.end());
+    part_.insert(part_.end(), part.part.begin(), part.part.end());
+    if (has_parts) part_.resize(from_.size(), glm::vec3(1.0F));
     for (const auto count : part.counts) first_.push_back(first_.back() + count);
     part = {};
   }
@@ -198,16 +228,10 @@ void ProbeRays::traceRound(const PlaceLight& light, const glm::dvec3& place, std
       sight.nearest = std::min(sight.nearest, distance);
       sight.backs += light.rays().isBack(at.value, at.end, at.direction) ? 1.0F : 0.0F;
       part.lobes.add(direction[i], static_cast<double>(distance));
-      const auto add = [&](std::uint32_t which, const glm::dvec3& left) {
-        part.from.push_back(which);
-        part.direction.push_back(packed(direction[i]));
-        part.part.emplace_back(left);
-      };
-      if (at.value != LeafRays::kNothing) add(sources.leaf(at.value), tint);
+      if (at.value != LeafRays::kNothing) part.add(sources.leaf(at.value), direction[i], tint);
       followMirrors(light.tinted(), light.mirrors(), at, [&](const RayEnd& there, const glm::dvec3& left, MirrorHop) {
         if (there.value == LeafRays::kNothing || left == glm::dvec3(0.0)) return;
-        add(sources.leaf(there.value), tint * left);
-        if (sources.hasLamp(there.value)) add(sources.lamp(there.value), tint * left);
+        part.add(sources.inMirror(there.value), direction[i], tint * left);
       });
     }
   }
@@ -220,7 +244,8 @@ ProbeRays::Radiance ProbeRays::radianceOf(const PlaceLight& light) {
   for (std::size_t value = 0; value < light.radiosity().size(); ++value)
     radiance.push_back(
         radianceOfLeaf(light.radiosity()[value], off.empty() ? 0.0F : off[value].x + off[value].y + off[value].z));
-  for (const auto& emission : light.lampEmission()) radiance.push_back(radianceOfLeaf(emission, 0.0F));
+  for (std::size_t value = 0; value < light.lampEmission().size(); ++value)
+    radiance.push_back(radiance[value] + radianceOfLeaf(light.lampEmission()[value], 0.0F));
   for (std::uint32_t cell = 0; cell < SkyCells::kCount; ++cell)
     radiance.push_back(radianceOfLeaf(glm::vec3(light.skyAt(cell)), 0.0F));
   return radiance;
@@ -237,7 +262,10 @@ std::array<glm::dvec4, kHarmonics> ProbeRays::gatherRound(std::size_t number, co
     for (std::size_t i = 0; i < together; ++i) {
       direction[i] = direction_[first + i];
       auto of_ray = radiance[from_[first + i]];
-      if (!part_.empty()) of_ray *= glm::vec4(part_[first + i], 1.0F);
+      if (!part_.empty()) {
+        const auto& part = part_[first + i];
+        of_ray *= glm::vec4(part, (part.x + part.y + part.z) / 3.0F);
+      }
       for (int c = 0; c < 4; ++c) light[static_cast<std::size_t>(c)][i] = of_ray[c];
     }
     lanes.add(unpacked(direction), light);
@@ -272,11 +300,6 @@ ProbeSums ProbeRays::gather(std::size_t probe, const Radiance& radiance) const {
     if (all > 0.0) sums.variance[h] += off_square * (sum[0] / all) * (sum[0] / all);
   }
   return sums;
-}
-
-std::size_t ProbeRays::bytes() const {
-  return sights_.size() * sizeof(ProbeSight) + from_.size() * 2 * sizeof(std::uint32_t) +
-         part_.size() * sizeof(glm::vec3) + first_.size() * sizeof(std::uint64_t);
 }
 
 }  // namespace radiosity::solver

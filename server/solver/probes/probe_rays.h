@@ -41,9 +41,17 @@ class ProbeRays {
 
   /// `places`: unit box. `rays`: of a probe, a multiple of kRounds and geometry::kPacket. The same key gives the same
   /// bits, whatever the number of threads. Cost: these rays, and those that mirrors reflect, on all cores; 8 bytes a
-  /// ray, 20 where there are mirrors or coloured glass. Throws what interrupts the task (task.h), and std::bad_alloc.
-  ProbeRays(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint32_t rays, std::uint64_t key);
+  /// ray, and as many for each mirror on its way, 20 where mirrors or coloured glass take light. Where that would be
+  /// more than `most_ends` ends of rays, half as many rays are cast, down to kLeastRays; each try costs at most as
+  /// many. Throws what interrupts the task (task.h), and std::bad_alloc.
+  ProbeRays(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint32_t rays, std::uint64_t key,
+            std::size_t most_ends = kMostEnds);
 
+  /// 640 MiB where mirrors take light.
+  static constexpr std::size_t kMostEnds = std::size_t{1} << 25;
+  static constexpr std::uint32_t kLeastRays = 64;
+  /// False: mirrors make too many ends even of kLeastRays; nothing is kept, and only this may be asked.
+  [[nodiscard]] bool areWithinBounds() const { return rays_ > 0; }
   [[nodiscard]] std::size_t probeCount() const { return sights_.size(); }
   [[nodiscard]] const ProbeSight& sightOf(std::size_t probe) const { return sights_[probe]; }
   /// False: rays go other ways than these in the mirrors and the glass that `light` has.
@@ -58,10 +66,11 @@ class ProbeRays {
   /// the radiance is off by: the mean square over all coefficients, which are as likely to be off, shared out by
   /// channel as the light is. O(rays), some 15 ns each.
   [[nodiscard]] ProbeSums gather(std::size_t probe, const Radiance& radiance) const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct Part;  ///< of probes that are traced together
+  [[nodiscard]] bool cast(const PlaceLight& light, std::span<const glm::dvec3> places, std::uint64_t key,
+                          std::size_t most_ends);
   void trace(const PlaceLight& light, const glm::dvec3& place, std::uint64_t key, Part& part) const;
   void traceRound(const PlaceLight& light, const glm::dvec3& place, std::uint64_t key, Part& part,
                   ProbeSight& sight) const;
@@ -72,7 +81,7 @@ class ProbeRays {
   std::uint32_t rays_ = 0;
   std::uint64_t mirror_key_ = 0;
   std::vector<ProbeSight> sights_;
-  // By ray, or by leaf on the way of one.
+  // By ray, or by leaf on the way of one: its ends.
   std::vector<std::uint32_t> from_;       ///< into Radiance
   std::vector<std::uint32_t> direction_;  ///< packed
   std::vector<glm::vec3> part_;           ///< what is left of the light; empty: all of it, everywhere

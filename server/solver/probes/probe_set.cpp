@@ -23,6 +23,20 @@ std::vector<glm::dvec3> placesOf(const ProbeLattice& lattice) {
   return places;
 }
 
+/// The share of one grid.
+std::size_t endsFor(std::size_t probes, std::size_t in_all) {
+  const double share = static_cast<double>(probes) / static_cast<double>(std::max<std::size_t>({1, probes, in_all}));
+  return static_cast<std::size_t>(share * static_cast<double>(ProbeRays::kMostEnds));
+}
+
+/// What is missing need not come from where other light does: coefficients that are 0 may be off by it, too.
+void addSystematic(double part, ProbeSums& sums) {
+  glm::dvec3 square(0.0);
+  for (const auto& mean : sums.mean) square += mean * mean / static_cast<double>(kHarmonics);
+  for (std::size_t h = 0; h < kHarmonics; ++h)
+    sums.variance[h] += part * part * glm::max(square, sums.mean[h] * sums.mean[h]);
+}
+
 ProbeLight toLight(const ProbeSums& sums) {
   ProbeLight light;
   for (std::size_t h = 0; h < kHarmonics; ++h) {
@@ -98,12 +112,13 @@ std::uint32_t ProbeSet::raysFor(std::size_t probes) {
   return std::max(kLeastRays, static_cast<std::uint32_t>(rays) / kStep * kStep);
 }
 
-ProbeSet::ProbeSet(const PlaceLight& light, const ProbeLattice& lattice, std::uint32_t rays, std::uint64_t key)
+ProbeSet::ProbeSet(const PlaceLight& light, const ProbeLattice& lattice, std::uint32_t rays, std::uint64_t key,
+                   std::size_t in_all)
     : lattice_(lattice),
-      rays_(light, placesOf(lattice), rays, key),
-      lamps_(placesOf(lattice), mixKeys(key, kLampSeed)) {}
+      rays_(light, placesOf(lattice), rays, key, endsFor(lattice.probeCount(), in_all)),
+      lamps_(placesOf(lattice), mixKeys(key, kLampSeed), in_all) {}
 
-std::vector<ProbeLight> ProbeSet::light(const PlaceLight& light) {
+std::vector<ProbeLight> ProbeSet::light(const PlaceLight& light, double systematic) {
   lamps_.update(light);
   const auto radiance = ProbeRays::radianceOf(light);
   std::vector<ProbeLight> probes(rays_.probeCount());
@@ -116,6 +131,7 @@ std::vector<ProbeLight> ProbeSet::light(const PlaceLight& light) {
       }
       auto sums = rays_.gather(i, radiance);
       lamps_.addTo(i, sums);
+      addSystematic(systematic, sums);
       probes[i] = toLight(sums);
     }
   });
@@ -126,8 +142,10 @@ std::vector<ProbeLight> ProbeSet::light(const PlaceLight& light) {
 void fillProbes(const ProbeLattice& lattice, std::vector<ProbeLight>& probes) {
   std::vector<std::size_t> last;
   std::vector<bool> is_met(probes.size());
-  for (std::size_t i = 0; i < probes.size(); ++i)
-    if (probes[i].ring == 0) last.push_back(i), is_met[i] = true;
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    is_met[i] = probes[i].ring == 0;
+    if (is_met[i]) last.push_back(i);
+  }
   for (std::uint32_t ring = 1; !last.empty(); ++ring) {
     std::vector<std::size_t> next;
     for (const auto probe : last) {

@@ -41,21 +41,29 @@ class ProbeSet {
   /// A probe is measured where rays meet backs in at most so much of all directions; solids have backs all around.
   static constexpr float kMostBacks = 0.25F;
   /// Rays of a probe: kMostRays, or, of many probes, as many as make kRaysInAll, but kLeastRays.
-  static constexpr std::uint32_t kMostRays = 256, kLeastRays = 64;
+  static constexpr std::uint32_t kMostRays = 256, kLeastRays = ProbeRays::kLeastRays;
   static constexpr std::size_t kRaysInAll = std::size_t{1} << 24;
   [[nodiscard]] static std::uint32_t raysFor(std::size_t probes);
 
-  /// ProbeRays and ProbeLamps of the grid. Throws what interrupts the task (task.h), and std::bad_alloc.
-  ProbeSet(const PlaceLight& light, const ProbeLattice& lattice, std::uint32_t rays, std::uint64_t key);
+  /// ProbeRays and ProbeLamps of the grid. `in_all`: probes of all grids, which share the memory that either may take.
+  /// Throws what interrupts the task (task.h), and std::bad_alloc.
+  ProbeSet(const PlaceLight& light, const ProbeLattice& lattice, std::uint32_t rays, std::uint64_t key,
+           std::size_t in_all);
+  /// Of one grid alone.
+  ProbeSet(const PlaceLight& light, const ProbeLattice& lattice, std::uint32_t rays, std::uint64_t key)
+      : ProbeSet(light, lattice, rays, key, lattice.probeCount()) {}
+  /// False: mirrors send the least number of rays on too often; no light can be told.
+  [[nodiscard]] bool isWithinBounds() const { return rays_.areWithinBounds(); }
 
   /// False: `light` is of the same scene, but what mirrors and glass do in it is not what the rays remember.
   [[nodiscard]] bool fits(const PlaceLight& light) const { return rays_.fits(light); }
   /// `light`: of the same scene, lit in whatever way, that fits. The same bits as those of a new set. Cost: looks at
   /// lamps that are new or were moved, and a pass over all rays, on all cores.
-  [[nodiscard]] std::vector<ProbeLight> light(const PlaceLight& light);
+  /// `systematic`: part of all light that the solve may be off by, alike everywhere, as its halves do not tell: of each
+  /// channel, this part of a coefficient, or of what coefficients are as root mean square, is in its error.
+  [[nodiscard]] std::vector<ProbeLight> light(const PlaceLight& light, double systematic = 0.0);
 
   [[nodiscard]] const ProbeSight& sightOf(std::size_t probe) const { return rays_.sightOf(probe); }
-  [[nodiscard]] const ProbeLattice& lattice() const { return lattice_; }
   /// Groups of lamps that probes looked at so far.
   [[nodiscard]] std::uint64_t lampsTaken() const { return lamps_.taken(); }
 

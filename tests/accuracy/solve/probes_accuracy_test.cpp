@@ -143,7 +143,7 @@ TEST_P(SolvedProbes, HaveTheLightOfThePathTracerAndTellTheirErrorTruly) {
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto folder = fs::path(RADIOSITY_BINARY_DIR) / "accuracy" / ("SolvedProbes." + test.scene);
   fs::create_directories(folder);
-  std::vector<std::string> options{"--error",  "0.01",       "--time-limit", "60",
+  std::vector<std::string> options{"--error",  "0.02",       "--time-limit", "60",
                                    "--probes", test.spacing, "--probes-out", (folder / "probes.json").string()};
   const auto run = runSolve(RADIOSITY_CLIENT, file, folder, options, true);
   ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 3) << run.last_line;
@@ -152,7 +152,7 @@ TEST_P(SolvedProbes, HaveTheLightOfThePathTracerAndTellTheirErrorTruly) {
   const auto scene = oracle::readGlb(file);
   std::vector<glm::dvec3> places;
   for (const auto& probe : probes) places.push_back(probe.place);
-  const auto truth = traced(scene, places, 1024);
+  const auto truth = traced(scene, places, 512);
   glm::dvec3 sum(0.0), of_truth(0.0), sum_variance(0.0);
   double off = 0.0, stated = 0.0;  // squares, both by what the light of the probe is
   for (std::size_t p = 0; p < probes.size(); ++p) {
@@ -175,14 +175,14 @@ TEST_P(SolvedProbes, HaveTheLightOfThePathTracerAndTellTheirErrorTruly) {
   RecordProperty("stated", std::to_string(std::sqrt(stated / (27.0 * static_cast<double>(probes.size())))));
   // What the solve was asked for, and three standard errors.
   for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(sum[c] / of_truth[c], 1.0, 0.01 + 3.0 * std::sqrt(sum_variance[c]) / of_truth[c]) << c;
+    EXPECT_NEAR(sum[c] / of_truth[c], 1.0, 0.02 + 3.0 * std::sqrt(sum_variance[c]) / of_truth[c]) << c;
   EXPECT_GT(ratio, 1.0 / 1.5);
   EXPECT_LT(ratio, 1.5);
 }
 
+// Mirrors, glass, lamps and the sky once each; what is plainer is in all of them.
 INSTANTIATE_TEST_SUITE_P(Scenes, SolvedProbes,
-                         testing::Values(Case{"cornell", "0.25"}, Case{"room_small", "0.8"},
-                                         Case{"room_small_mirror", "0.8"}, Case{"room_small_tinted", "0.8"},
+                         testing::Values(Case{"room_small_mirror", "0.8"}, Case{"room_small_tinted", "0.8"},
                                          Case{"room_lights", "0.8"}, Case{"room_small_open", "0.8"}),
                          [](const auto& info) { return info.param.scene; });
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "protocol/probes.h"
+#include "server/scene/values/probe_grid.h"
 #include "tests/service/net/running_server.h"
 #include "tests/service/net/test_client.h"
 
@@ -11,6 +12,8 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+
+static_assert(scene::kMostProbes == protocol::kMaxProbes && scene::kMostProbeGrids == protocol::kMaxProbeGrids);
 
 TEST(LightProbes, AreJsonByHttp) {
   RunningServer server;
@@ -56,6 +59,9 @@ TEST(LightProbes, AskedForWronglyAreRefusedByTheirPlace) {
     const std::string where = wrong[0] == 'l' ? "?light=" : "?spacing=";
     EXPECT_THAT(got.body, HasSubstr(where)) << wrong;
   }
+  const auto alone = request(server.port(), "GET", "/probes.bin?light=false");
+  EXPECT_EQ(alone.status, 400) << "its head would be that of a file with light";
+  EXPECT_THAT(alone.body, HasSubstr("?light="));
   const auto many = request(server.port(), "GET", "/probes.bin?spacing=1e-6");
   EXPECT_EQ(many.status, 413);
   EXPECT_THAT(many.body, HasSubstr("?spacing="));

@@ -26,6 +26,16 @@ class ProbeGrids : public EngineTest {
                  R"(, "extras": {"radiosityProbes": {"size": [1, 1, 1], "spacing": )" + spacing +
                  R"(}}}}, {"op": "add", "path": "/scenes/0/nodes/-", "value": )" + node + "}]");
   }
+  /// Of probes that are asked for again, and of the same once others were asked for, so that they are made anew.
+  void expectAnew(double spacing, const std::vector<float>& before) {
+    const auto kept = probes({spacing});
+    ASSERT_TRUE(kept) << kept.error().text();
+    ASSERT_TRUE(probes({1.7 * spacing}));
+    const auto made = probes({spacing});
+    ASSERT_TRUE(made) << made.error().text();
+    EXPECT_EQ(kept->grids[0].values, made->grids[0].values);
+    EXPECT_NE(kept->grids[0].values, before);
+  }
 };
 
 constexpr std::size_t kRing = engine::kProbeValues - 1;
@@ -90,6 +100,44 @@ TEST_F(ProbeGrids, FollowEditsOfLightToTheBitsOfNewOnes) {
   EXPECT_NEAR(sum / of_before, 0.5, 0.02) << "of a solve to a fifth";
   ASSERT_TRUE(probes({0.7}));  // what was kept is not that of the next
   EXPECT_EQ(probes({0.4})->grids[0].values, after->grids[0].values);
+}
+
+// What is kept of the scene before must not be told of the next.
+TEST_F(ProbeGrids, AfterABlockIsMovedAreTheBitsOfNewOnes) {
+  solve(blockRoom());
+  const auto before = probes({0.4});
+  ASSERT_TRUE(before) << before.error().text();
+  ASSERT_TRUE(patch(R"([{"op": "add", "path": "/nodes/2/translation", "value": [1.4, 0, 1.3]}])"));
+  ASSERT_TRUE(eventually([&] { return status().state == State::kConverged; }));
+  expectAnew(0.4, before->grids[0].values);
+}
+
+TEST_F(ProbeGrids, AfterAMetalIsRecolouredAreTheBitsOfNewOnes) {
+  auto scene = blockRoom();
+  scene.materials[2].metallic = 1.0;
+  scene.materials[2].roughness = 0.2;
+  solve(scene);
+  const auto before = probes({0.4});
+  ASSERT_TRUE(before) << before.error().text();
+  ASSERT_TRUE(patch(
+      R"([{"op": "add", "path": "/materials/2/pbrMetallicRoughness/baseColorFactor", "value": [0.1, 0.9, 0.3, 1]}])"));
+  ASSERT_TRUE(eventually([&] { return status().state == State::kConverged; }));
+  expectAnew(0.4, before->grids[0].values);
+}
+
+// Half a spacing from a sheet, on either side, where one layer would lie in it.
+TEST_F(ProbeGrids, OfAFlatSceneHaveTwoLayers) {
+  auto scene = blockRoom();
+  scene.objects.resize(1);
+  scene.objects[0] = {"floor", {}, {}};
+  test_scenes::appendBox(scene.objects[0], {0.0, 0.0, 0.0}, {2.0, 0.01, 2.0}, test_scenes::allFaces(1));
+  solve(scene);
+  const auto report = probes({0.5});
+  ASSERT_TRUE(report) << report.error().text();
+  const auto& grid = report->grids[0];
+  EXPECT_EQ(grid.counts, (std::array<std::uint32_t, 3>{4, 2, 4}));
+  EXPECT_NEAR(grid.first.y, 0.005 - 0.25, 1e-6);
+  for (std::size_t i = 0; i < grid.values.size(); i += engine::kProbeValues) EXPECT_GT(grid.values[i], 0.0F);
 }
 
 TEST_F(ProbeGrids, InsideABlockAreFilledFromOutside) {

@@ -284,6 +284,36 @@ TEST_F(Probes, TellHowFarSurfacesAre) {
     EXPECT_GE(sight.square[lobe], sight.distance[lobe] * sight.distance[lobe]);
 }
 
+TEST_F(Probes, CountWhatTheHalvesOfTheSolveDoNotTell) {
+  const auto quad = lamp({30.0F, 20.0F, 10.0F});
+  show({floor(), quad});
+  const glm::dvec3 place(0.2, -0.1, 0.15);
+  const auto now = light();
+  const auto found = ProbeSet(now, single(place), kRays, 1).light(now, 0.1).front();
+  double square = 0.0;
+  for (const auto& of : found.light) square += std::pow(of.x, 2.0) / kHarmonics;
+  for (std::size_t h = 0; h < kHarmonics; ++h) {
+    const double least = std::max(std::sqrt(square), std::abs(double{found.light[h].x}));
+    EXPECT_NEAR(found.error[h].x, 0.1 * least, 1e-4 * least) << h << ": else nothing is off";
+  }
+}
+
+// Each ray ends in the sky or on the floor.
+TEST_F(Probes, CastFewerRaysWhereTheyWouldHaveTooManyEnds) {
+  sources_.sky.upper = sources_.sky.lower = glm::vec3(10.0F);
+  const std::array places{glm::dvec3(0.0, 0.2, 0.0)};
+  const auto now = light();
+  const auto radiance = ProbeRays::radianceOf(now);
+  const auto lightOf = [&](std::uint32_t rays, std::size_t most_ends) {
+    const ProbeRays made(now, places, rays, 1, most_ends);
+    EXPECT_TRUE(made.areWithinBounds());
+    return made.gather(0, radiance).mean;
+  };
+  EXPECT_EQ(lightOf(256, 255), lightOf(128, 256));
+  EXPECT_EQ(lightOf(256, 256), lightOf(256, 1000));
+  EXPECT_FALSE(ProbeRays(now, places, 256, 1, 30).areWithinBounds());
+}
+
 TEST(ProbeFill, OfAGridWithoutAnyMeasuredProbeIsBlack) {
   std::vector<ProbeLight> probes(8);
   for (auto& probe : probes) probe.ring = ProbeLight::kUnfilled;
