@@ -21,7 +21,7 @@ constexpr double kInLampsPlane = 1e-5;
 constexpr double kAnywhere = 0.1;
 /// By so many leaves is told how much all reflect.
 constexpr std::size_t kEnoughLeaves = 1024;
-constexpr std::uint64_t kFirstRay = 0x4649525354ULL;
+constexpr std::uint64_t kStretchKey = 0x53545245ULL, kFirstRay = 0x4649525354ULL;
 /// Of all paths, those that leave their lamp into any direction.
 constexpr double kPartAnywhere = 1.0 / CausticPaths::kOneAnywhere;
 
@@ -63,7 +63,9 @@ std::shared_ptr<const CausticPaths> CausticPaths::find(std::span<const Side> sid
 double CausticPaths::litPart(const LightPolygon& lamp, const LampImages* but_images) const {
   const auto step = (leaves_.size() + kEnoughLeaves - 1) / kEnoughLeaves;
   double lit = 0.0;
-  for (std::size_t i = 0; i < leaves_.size(); i += step) {
+  for (std::size_t first = 0; first < leaves_.size();
+       first += step) {  // any of each stretch, so that none is a pattern
+    const auto i = std::min(first + static_cast<std::size_t>(mixKeys(kStretchKey, first) % step), leaves_.size() - 1);
     if (but_images != nullptr && but_images->isIn(leaves_[i])) continue;
     lit += static_cast<double>(weight_[i]) * unhiddenLight(lamp, rays_->placeOn(leaves_[i], {0.5, 0.5}));
   }
@@ -143,6 +145,8 @@ CausticPaths::Light CausticPaths::anywhere(std::size_t lamp, const Starts& start
   LeafRays::Place met;
   const auto value = rays_->see({from, normal}, cosineDirection(normal, draw.x, draw.y), key, met);
   if (!reflects(value)) return {};
+  // Towards leaves no path goes where one has no area, and another stands for it.
+  if (value != met.value) return between(polygon, from, met.position, 0.0);
   const auto found = std::ranges::lower_bound(leaves_, value);
   if (found == leaves_.end() || *found != value) return {};
   const auto which = static_cast<std::size_t>(found - leaves_.begin());

@@ -50,8 +50,8 @@ constexpr int kParts = 32;
 /// sides of a bulb of coloured glass paths were off by some hundredths of the light, for a reason that is not known
 /// yet.
 constexpr double kImagesTellAll = 0.02;
-/// Of the room, what the noise of images of lamps in mirrors may take, and that of colours of lamps: they fall faster
-/// than that of rays.
+/// Of the room, what the noise of lamps in mirrors may take, and that of colours of lamps: that of images and colours
+/// falls faster than that of rays, and that of paths as fast.
 constexpr double kImages = 0.2;
 
 }  // namespace

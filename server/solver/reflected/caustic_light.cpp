@@ -36,11 +36,19 @@ constexpr std::uint64_t kCausticSeed = 0x43415553544943ULL;
 }  // namespace
 
 /// Of light that is spread evenly the square of the noise is that of the mirrored part, times the leaves, by paths.
-std::uint32_t CausticLight::pathsOf(const CausticPaths& paths, std::size_t lamp, std::uint32_t leaves) const {
+std::uint32_t CausticLight::firstPathsOf(const CausticPaths& paths, std::size_t lamp, std::uint32_t leaves) {
   const double part = paths.partOf(lamp) / kFirstNoise, a_leaf = std::min(kFirstPaths, part * part);
   const double all = a_leaf * leaves / static_cast<double>(paths.lampCount());
   const auto each = std::clamp(static_cast<std::uint32_t>(std::min(all, double{kMostFirst})), kLeastPaths, kMostFirst);
-  return std::bit_ceil(each) * times_;
+  return std::bit_ceil(each);
+}
+
+const CausticLight::OfLamp* CausticLight::findKnown(std::uint64_t key) const {
+  for (const auto* lamps : {&known_, &spare_}) {
+    const auto found = std::ranges::find(*lamps, key, &OfLamp::key);
+    if (found != lamps->end()) return &*found;
+  }
+  return nullptr;
 }
 
 std::optional<CausticLight::OfLamp> CausticLight::take(std::uint64_t key) {
@@ -62,14 +70,13 @@ void CausticLight::begin(Lamps lamps, const LeafShading* shading, std::uint32_t 
   for (std::size_t i = 0; i < count; ++i) {
     const auto key = lamps.paths->keyOf(i);
     auto same = take(key);
-    next.push_back(same ? std::move(*same) : OfLamp{key});
-    next.back().wanted = pathsOf(*lamps.paths, i, leaves);
+    // However many other lamps there are by then, that it comes back changes no bit.
+    next.push_back(same ? std::move(*same) : OfLamp{key, firstPathsOf(*lamps.paths, i, leaves)});
   }
   open_.reset();
   keepSpare();
   known_ = std::move(next);
   lamps_ = std::move(lamps);
-  leaf_count_ = leaves;
 }
 
 /// What is known of lamps that are not there any more, as far as there is room: those that are switched off come back.
@@ -80,42 +87,38 @@ void CausticLight::keepSpare() {
 }
 
 bool CausticLight::isBehind() const {
-  return std::ranges::any_of(known_, [&](const OfLamp& lamp) { return lamp.followed < lamp.wanted; });
+  return std::ranges::any_of(known_, [&](const OfLamp& lamp) { return lamp.followed < wantedOf(lamp); });
 }
 
 std::uint64_t CausticLight::raysFor(const Lamps& lamps, std::uint32_t leaves) const {
   if (!lamps.paths || is_given_up_) return 0;
-  std::uint64_t rays = 0;
+  std::uint64_t paths = 0;
   for (std::size_t i = 0; i < lamps.paths->lampCount(); ++i) {
-    const auto each = pathsOf(*lamps.paths, i, leaves);
-    std::uint32_t followed = 0;
-    for (const auto* some : {&known_, &spare_})
-      for (const auto& lamp : *some)
-        if (lamp.key == lamps.paths->keyOf(i)) followed = std::max(followed, lamp.followed);
-    rays += std::uint64_t{2} * kRaysAPath * (each - std::min(each, followed));
+    const auto* known = findKnown(lamps.paths->keyOf(i));
+    if (known == nullptr) paths += std::uint64_t{firstPathsOf(*lamps.paths, i, leaves)} * times_;
+    if (known != nullptr) paths += wantedOf(*known) - std::min(known->followed, wantedOf(*known));
   }
-  return rays;
+  return paths * 2 * kRaysAPath;
 }
 
 bool CausticLight::refine(double times) {
   if (!lamps_.paths) return false;
   const auto before = times_;
   while (times_ < kMostTimes && times_ < std::min(times, kMostTimesAStep) * before) times_ *= 2;
-  for (std::size_t i = 0; i < known_.size(); ++i) known_[i].wanted = pathsOf(*lamps_.paths, i, leaf_count_);
   return times_ > before;
 }
 
 bool CausticLight::advance(double seconds) {
   const auto begin = Clock::now();
   for (std::size_t i = 0; i < known_.size(); ++i) {
-    if (known_[i].followed >= known_[i].wanted) {  // those that were given up before the last may be enough now
+    if (known_[i].followed >= wantedOf(known_[i])) {  // those that were given up before the last may be enough now
       for (std::size_t half = 0; half < 2; ++half)
         if (!known_[i].fresh[half].empty()) merge(known_[i].leaves[half], known_[i].fresh[half]);
       continue;
     }
     if (!open_ || open_->lamp != i) open_.emplace(OpenLamp{i, lamps_.paths->startsOf(i)});
-    if (open_->starts.empty()) known_[i].followed = known_[i].wanted;
-    while (known_[i].followed < known_[i].wanted) {
+    if (open_->starts.empty()) known_[i].followed = wantedOf(known_[i]);
+    while (known_[i].followed < wantedOf(known_[i])) {
       followSome(known_[i], *open_);
       if (bytes() > most_bytes_) spare_.clear();
       if (bytes() > most_bytes_) {
@@ -140,18 +143,19 @@ void CausticLight::giveUp() {
 
 /// In the order of paths, whoever followed them.
 void CausticLight::followSome(OfLamp& known, const OpenLamp& open) {
-  const auto first = known.followed, goes = std::min(kGoesAtOnce, (known.wanted - first + kAtOnce - 1) / kAtOnce);
+  const auto first = known.followed, wanted = wantedOf(known),
+             goes = std::min(kGoesAtOnce, (wanted - first + kAtOnce - 1) / kAtOnce);
   std::array<std::vector<Leaves>, 2> brought;
   for (auto& half : brought) half.resize(goes);
   inTurns(std::size_t{2} * goes, [&](std::size_t turn) {
     const auto from = first + static_cast<std::uint32_t>(turn / 2) * kAtOnce;
-    brought[turn % 2][turn / 2] = follow(open, turn % 2, from, std::min(known.wanted, from + kAtOnce));
+    brought[turn % 2][turn / 2] = follow(open, turn % 2, from, std::min(wanted, from + kAtOnce));
   });
-  const auto followed = std::min(known.wanted, first + goes * kAtOnce);
+  const auto followed = std::min(wanted, first + goes * kAtOnce);
   for (std::size_t half = 0; half < 2; ++half) {
     auto& fresh = known.fresh[half];
     for (const auto& some : brought[half]) fresh.insert(fresh.end(), some.begin(), some.end());
-    if (followed == known.wanted || fresh.size() > known.leaves[half].size()) merge(known.leaves[half], fresh);
+    if (followed == wanted || fresh.size() > known.leaves[half].size()) merge(known.leaves[half], fresh);
   }
   known.followed = followed;
 }

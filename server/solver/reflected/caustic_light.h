@@ -61,15 +61,18 @@ class CausticLight {
   using Leaves = std::vector<Leaf>;
   struct OfLamp {
     std::uint64_t key = 0;
-    std::uint32_t followed = 0, wanted = 0;  ///< paths of each half
-    std::array<Leaves, 2> leaves{};          ///< by value
-    std::array<Leaves, 2> fresh{};  ///< in the order of paths, to be added to these; empty once all are followed
+    std::uint32_t first = 0;         ///< paths of each half, of times() of one: those of when it was first seen
+    std::uint32_t followed = 0;      ///< paths of each half
+    std::array<Leaves, 2> leaves{};  ///< by value
+    std::array<Leaves, 2> fresh{};   ///< in the order of paths, to be added to these; empty once all are followed
   };
   struct OpenLamp {
     std::size_t lamp = 0;
     CausticPaths::Starts starts;
   };
-  [[nodiscard]] std::uint32_t pathsOf(const CausticPaths& paths, std::size_t lamp, std::uint32_t leaves) const;
+  [[nodiscard]] static std::uint32_t firstPathsOf(const CausticPaths& paths, std::size_t lamp, std::uint32_t leaves);
+  [[nodiscard]] std::uint32_t wantedOf(const OfLamp& lamp) const { return lamp.first * times_; }
+  [[nodiscard]] const OfLamp* findKnown(std::uint64_t key) const;
   [[nodiscard]] std::optional<OfLamp> take(std::uint64_t key);
   void keepSpare();
   void followSome(OfLamp& known, const OpenLamp& open);
@@ -83,7 +86,6 @@ class CausticLight {
   std::size_t most_bytes_;
   Lamps lamps_;
   const LeafShading* shading_ = nullptr;
-  std::uint32_t leaf_count_ = 0;
   std::uint32_t times_ = 1;  ///< as many paths as at first
   bool is_given_up_ = false;
   std::optional<OpenLamp> open_;  ///< whose paths are being followed

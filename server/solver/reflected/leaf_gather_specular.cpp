@@ -206,8 +206,10 @@ void LeafGather::takeImages() {
   inBothHalves([&](std::size_t h) { mirrored_lamps_.addImagesTo(h, halves_[h].imaged); });
   std::array<std::vector<glm::vec3>, 2> caustics;
   inBothHalves([&](std::size_t h) {
-    caustics[h].assign(sights_.leafCount(), glm::vec3(0.0F));
-    mirrored_lamps_.addCausticsTo(h, caustics[h]);
+    if (mirrored_lamps_.caustics() != nullptr) {
+      caustics[h].assign(sights_.leafCount(), glm::vec3(0.0F));
+      mirrored_lamps_.addCausticsTo(h, caustics[h]);
+    }
     auto& imaged = halves_[h].imaged;
     for (std::uint32_t v = 0; v < imaged.size(); ++v)
       if (light_.mirrors->isGlass(v)) imaged[v] = glm::vec3(0.0F);
@@ -216,7 +218,7 @@ void LeafGather::takeImages() {
   inBothHalves([&](std::size_t h) {
     auto& imaged = halves_[h].imaged;
     for (std::uint32_t v = 0; v < imaged.size(); ++v) {
-      imaged[v] += caustics[h][v];
+      if (!caustics[h].empty()) imaged[v] += caustics[h][v];
       light_.irradiance[h][v] += imaged[v];
     }
   });

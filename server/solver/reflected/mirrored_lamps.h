@@ -41,7 +41,7 @@ class MirroredLamps {
   /// About so many times as many looks at images, and as many paths; 1 and less: as they are.
   bool refine(double looks, double paths);
 
-  /// Null: rays find lamps in flat mirrors, or paths do; null: rays find those in all others.
+  /// Null: no lamp is looked for in flat mirrors; and no path is followed from any. Then rays find what they find.
   [[nodiscard]] const LampImages* images() const { return images_.images(); }
   [[nodiscard]] const CausticPaths* caustics() const { return caustics_.paths(); }
   [[nodiscard]] bool any() const { return images_.images() || sources_.images() || caustics_.paths(); }

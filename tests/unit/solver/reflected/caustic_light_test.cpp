@@ -146,6 +146,7 @@ TEST_F(CausticLightTest, NoPathOfALampNextToTheMirrorBringsMuchMoreThanOthers) {
 
 TEST_F(CausticLightTest, IsTheSameHoweverItIsCut) {
   auto at_once = make(), in_slices = make();
+  for (auto* caustics : {&at_once, &in_slices}) caustics->setTimes(16);  // so many that a lamp's are cut
   const std::vector<LightPolygon> two{lampAt(0.6, 2), lampAt(0.3, 4)};
   begin(at_once, lamps(two));
   ASSERT_TRUE(at_once.advance(HUGE_VAL));
@@ -176,6 +177,22 @@ TEST_F(CausticLightTest, OfOtherLightOrOfALampThatComesBackFollowsNoPathAgain) {
   EXPECT_GT(caustics.raysFor(lamps({lampAt(0.6, 4)}), leafCount()), 0U) << "another hangs there";
   polish(1, 0.4F);
   EXPECT_GT(caustics.raysFor(lamps({lampAt(0.6)}), leafCount()), 0U) << "the mirror is another";
+}
+
+// However many others there are meanwhile: each is worth a part of what one by itself would be.
+TEST_F(CausticLightTest, ALampAmongOthersIsTheSameWhenTheseComeBack) {
+  constexpr std::uint32_t kLeaves = 16384;  // of so many two lamps share the paths
+  const std::vector<LightPolygon> two{lampAt(0.6, 2), lampAt(0.3, 4)}, one{two[0]};
+  auto caustics = make();
+  caustics.begin(lamps(two), nullptr, kLeaves);
+  ASSERT_TRUE(caustics.advance(HUGE_VAL));
+  const auto light = lightOf(caustics);
+  EXPECT_NE(make().raysFor(lamps(one), kLeaves), make().raysFor(lamps(two), kLeaves) / 2) << "they share";
+  caustics.begin(lamps(one), nullptr, kLeaves);
+  EXPECT_FALSE(caustics.isBehind());
+  caustics.begin(lamps(two), nullptr, kLeaves);
+  EXPECT_FALSE(caustics.isBehind());
+  EXPECT_EQ(lightOf(caustics), light);
 }
 
 TEST_F(CausticLightTest, FollowsMorePathsWhenItIsRefined) {
