@@ -9,15 +9,13 @@
 namespace radiosity::cli {
 
 struct Ran {
-  int exit_code = 0;  ///< 128 + signal where one ended it; kNoProgram: it was not found
+  int exit_code = 0;  ///< 128 + signal where one ended it
   std::string text;   ///< the last 4,096 bytes of what it printed, without the end of the line
 };
 
-inline constexpr int kNoProgram = 127;
-
-/// Runs the program of this name from PATH, with these words after it. Errors: kCancelled within 50 ms of a signal;
-/// kUnavailable: it has not ended after ten minutes, or cannot be started for lack of resources. The program is gone
-/// then.
+/// Runs the program of this name from PATH, with these words after it and nothing to read. Errors name the program:
+/// kNotFound: there is none; kCancelled within 50 ms of a signal; kUnavailable: it cannot be started, or has not ended
+/// after ten minutes. The program is gone then, with what it started itself.
 [[nodiscard]] Result<Ran> runProgram(std::vector<std::string> command);
 
 }  // namespace radiosity::cli

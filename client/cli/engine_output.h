@@ -20,16 +20,18 @@ struct EngineRequest {
   std::string png_path = {};  ///< a picture as well; empty: none
 };
 
-/// kBadUsage where the folder cannot be written; to be asked before a long solve rather than after.
-[[nodiscard]] Result<void> checkEngineFolder(const std::string& folder);
-
 struct EngineSaved {
   std::vector<std::string> paths;
-  std::string note;  ///< what the encoding loses, lamps, and what to do next: lines for the user
+  std::vector<std::string> warnings;  ///< what is not as one would expect: Blender failed, files of the user stay
+  std::vector<std::string> notes;     ///< what the encoding loses, lamps, and what to do next
 };
-/// Downloads a scene and writes its files, all of them or none. For Blender it runs Blender, if that is installed, to
-/// make scene.blend. Errors: as of saveScene(); a full disk; Blender failed.
+/// Downloads a scene and writes its files; where any of them cannot be written, none. Pages and scripts in the folder
+/// that are not ours stay, and with them all that we have of these. For Blender it runs Blender, if that is installed,
+/// to make scene.blend; what it complains of is a warning. Errors: as of saveScene(); a full disk; kCancelled.
 [[nodiscard]] Result<EngineSaved> saveForEngine(const Remote& remote, const EngineRequest& request,
                                                 const engines::StatedError& error, ProgressDisplay& display);
+
+/// The warnings on stderr, and, unless `quiet`, the notes: each a line.
+void tellSaved(const EngineSaved& saved, bool quiet);
 
 }  // namespace radiosity::cli

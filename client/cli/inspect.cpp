@@ -159,8 +159,8 @@ ExitCode saveForEngine(const SaveOptions& options, const Remote& remote) {
   display.clear();
   if (!saved) return complain(saved.error());
   for (const auto& path : saved->paths) std::printf("%s\n", path.c_str());
-  std::fprintf(stderr, "%s%s\n%s\n", outcomeText(status->progress).c_str(), surfaceText(error).c_str(),
-               saved->note.c_str());
+  std::fprintf(stderr, "%s%s\n", outcomeText(status->progress).c_str(), surfaceText(error).c_str());
+  tellSaved(*saved, options.quiet);
   return ExitCode::kOk;
 }
 

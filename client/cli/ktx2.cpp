@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "client/cli/child_process.h"
-#include "client/cli/interrupt.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/transcoder_files.h"
 
@@ -83,13 +82,12 @@ Result<void> transcode(const fs::path& folder, const std::string& from, const st
        {std::pair(script, files.script), std::pair(basis, files.basis_script), std::pair(wasm, files.basis_wasm)})
     if (auto written = write(file, bytes); !written) return written;
   const auto ran = runProgram({"node", script.string(), basis.string(), wasm.string(), from, to});
-  if (!ran) return tl::unexpected(ran.error());
-  if (ran->exit_code == kNoProgram)
+  if (!ran && ran.error().code == ErrorCode::kNotFound)
     return fail(ErrorCode::kUnsupported,
                 "has KTX2 textures, which node unpacks, and node was not found: install it (Debian: nodejs), drop the "
                 "file on the viewer, or export PNG, JPEG or WebP",
                 path);
-  if (interrupted()) return fail(ErrorCode::kCancelled, "interrupted");  // a terminal tells node, too
+  if (!ran) return tl::unexpected(ran.error());
   if (ran->exit_code != 0) return fail(ErrorCode::kBadInput, ran->text.empty() ? "node failed" : ran->text, path);
   return {};
 }

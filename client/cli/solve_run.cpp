@@ -14,6 +14,7 @@
 #include "client/cli/report.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/server_process.h"
+#include "client/cli/staged_folder.h"
 #include "common/one_line.h"
 
 namespace radiosity::cli {
@@ -78,10 +79,13 @@ class Solve {
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
     const bool is_folder = !options_.engine.empty();
-    if (!options_.output.empty()) {
-      const auto ready =
-          is_folder ? checkEngineFolder(options_.output) : glbStem(options_.output).map([](const auto&) {});
-      if (!ready) return ready;
+    std::optional<StagedFolder> folder;  // for as long as it takes to see whether the picture can lie in it
+    if (is_folder && !options_.output.empty()) {
+      auto made = StagedFolder::open(options_.output);
+      if (!made) return tl::unexpected(made.error());
+      folder.emplace(std::move(*made));
+    } else if (!options_.output.empty()) {
+      if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
     }
     if (*kind == SceneKind::kGltf && options_.server.url.empty() && !sky_.isOfScene()) {
       const auto external = hasExternalFiles(options_.scene);
@@ -294,7 +298,8 @@ class Solve {
       const EngineRequest request{options_.engine, options_.output, options_.png};
       auto saved = saveForEngine(remote_, request, {error.total, error.p95}, display_);
       if (!saved) return tl::unexpected(saved.error());
-      display_.message(saved->note);
+      display_.clear();
+      tellSaved(*saved, options_.quiet);
       return std::move(saved->paths);
     }
     return saveScene(remote_,

@@ -1,6 +1,7 @@
 #include "client/cli/staged_folder.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -32,18 +33,55 @@ Result<void> flush(const std::string& path, int flags, const std::string& named)
   return {};
 }
 
+constexpr std::string_view kStagingName = ".radiosity-";
+
+/// Held while a file or folder is open, by whatever process: closing releases it. Where a file system knows no locks
+/// none is held, and isHeld() says so.
+class Lock {
+ public:
+  Lock(const std::string& path, int how) : file_(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    is_held_ = file_ >= 0 && flock(file_, how) == 0;
+  }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+  ~Lock() {
+    if (file_ >= 0) close(file_);
+  }
+
+  [[nodiscard]] bool isHeld() const { return is_held_; }
+  /// The file, which stays open.
+  [[nodiscard]] int release() { return std::exchange(file_, -1); }
+
+ private:
+  int file_;
+  bool is_held_;
+};
+
+/// What programs left that were killed. Those that still run hold a lock of theirs. `folder` is locked by the caller.
+void sweep(const std::string& folder) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (!entry.path().filename().string().starts_with(kStagingName) || !entry.is_directory(ignored)) continue;
+    if (const Lock lock(entry.path().string(), LOCK_EX | LOCK_NB); lock.isHeld()) fs::remove_all(entry.path(), ignored);
+  }
+}
+
 }  // namespace
 
-StagedFolder::StagedFolder(std::string folder, std::string staging, bool is_new)
-    : folder_(std::move(folder)), staging_(std::move(staging)), is_new_(is_new) {}
+StagedFolder::StagedFolder(std::string folder, std::string staging, int lock, bool is_new)
+    : folder_(std::move(folder)), staging_(std::move(staging)), lock_(lock), is_new_(is_new) {}
 
 StagedFolder::StagedFolder(StagedFolder&& other) noexcept
-    : folder_(std::move(other.folder_)), staging_(std::exchange(other.staging_, {})), is_new_(other.is_new_) {}
+    : folder_(std::move(other.folder_)),
+      staging_(std::exchange(other.staging_, {})),
+      lock_(std::exchange(other.lock_, -1)),
+      is_new_(other.is_new_) {}
 
 StagedFolder::~StagedFolder() {
   if (staging_.empty()) return;
   std::error_code ignored;
   fs::remove_all(staging_, ignored);
+  if (lock_ >= 0) close(lock_);
   if (is_new_) fs::remove(folder_, ignored);  // only if it is empty
 }
 
@@ -53,13 +91,16 @@ Result<StagedFolder> StagedFolder::open(const std::string& folder) {
     return fail(ErrorCode::kBadUsage, "this is a file; the name of a folder is needed", folder);
   const bool is_new = fs::create_directory(folder, error);
   if (error) return failHere("the folder cannot be made", folder, error.value());
-  auto staging = (fs::path(folder) / ".radiosity-XXXXXX").string();
+  const Lock whole(folder, LOCK_EX);  // so that nobody sweeps what is made here before it has a lock of its own
+  if (whole.isHeld()) sweep(folder);
+  auto staging = (fs::path(folder) / (std::string(kStagingName) + "XXXXXX")).string();
   if (mkdtemp(staging.data()) == nullptr) {
     const int number = errno;
     if (is_new) fs::remove(folder, error);
     return failHere("nothing can be written into this folder", folder, number);
   }
-  return StagedFolder(folder, std::move(staging), is_new);
+  Lock own(staging, LOCK_EX | LOCK_NB);
+  return StagedFolder(folder, std::move(staging), own.release(), is_new);
 }
 
 std::string StagedFolder::stagedPath(std::string_view name) const { return (fs::path(staging_) / name).string(); }

@@ -6,9 +6,11 @@
 #include <string_view>
 #include <utility>
 
-#include "client/engines/baked_scene.h"
+#include "client/engines/baked_materials.h"
+#include "client/engines/baked_nodes.h"
 #include "client/engines/encode.h"
 #include "client/engines/engine_files.h"
+#include "client/engines/gltf_json.h"
 
 namespace radiosity::engines {
 namespace {
@@ -60,6 +62,8 @@ class Export {
     const auto lamps = takeLightsOut(scene_.gltf);
     splitMaterialsByPage(scene_.gltf, scene_.pages.size());
     keepDiffuseOnly(scene_.gltf);
+    takeDeadChannelsOut(scene_.gltf);
+    trimExtensionLists(scene_.gltf);
     exported_.baked = lamps.size();
     if (auto done = addPages(); !done) return tl::unexpected(done.error());
     exported_.loss = square_ > 0.0 ? std::sqrt(square_loss_ / square_) : 0.0;

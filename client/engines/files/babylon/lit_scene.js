@@ -1,5 +1,6 @@
 // Loads the scene of this folder with its lightmaps. For your own page: copy this file, scene.glb, lighting.json and
-// the lightmaps, and call loadLitScene(). Made with Babylon.js 9.
+// the lightmaps, and call loadLitScene(). Tested with
+// Babylon.js 9.28.
 
 /**
  * Babylon adds a lightmap to the picture as it is, or multiplies all other light by it. A lightmap of irradiance is
@@ -51,14 +52,19 @@ function loadLightmap(B, scene, { file, luxOfOne }, folder) {
  * returned. Lamps that are in the lightmaps are not in the scene; their nodes tell what they were in
  * metadata.gltf.extras.bakedLight.
  *
- * @param {string} folder where the files are
+ * @param {string} folder URL of the folder with the files; unless stated, that of this script
  * @param B the names of Babylon.js: the global of its scripts, or those you import from @babylonjs/core
  */
-export async function loadLitScene(scene, folder = import.meta.url, B = globalThis.BABYLON) {
-  const base = new URL(folder, document.baseURI);
-  const about = await (await fetch(new URL('lighting.json', base))).json();
+export async function loadLitScene(scene, folder = new URL('.', import.meta.url).href, B = globalThis.BABYLON) {
+  const base = new URL(folder.replace(/\/?$/, '/'), document.baseURI);
+  const answer = await fetch(new URL('lighting.json', base));
+  if (!answer.ok) throw new Error(`${answer.url}: ${answer.status} ${answer.statusText}`);
+  const about = await answer.json();
   const [container, ...lightmaps] = await Promise.all([
-    B.LoadAssetContainerAsync(new URL(about.scene, base).href, scene),
+    // 0: no animation starts by itself. The light is that of the pose at rest.
+    B.LoadAssetContainerAsync(new URL(about.scene, base).href, scene, {
+      pluginOptions: { gltf: { animationStartMode: 0 } },
+    }),
     ...about.lightmaps.map((page) => loadLightmap(B, scene, page, base)),
   ]);
   const IrradianceLightmap = makeIrradianceLightmap(B);

@@ -2,8 +2,8 @@
 
     blender --background --factory-startup --python make_blend.py
 
-`radiosity` runs this where Blender is installed. Works in Blender 3.4 and later. Surfaces shine with the light of their lightmap,
-in nits, so that Cycles and Eevee show them at once; their Principled BSDF stays, for what they reflect as metal or
+`radiosity` runs this where Blender is installed. Tested with Blender 3.4.1. Surfaces shine with the light of their
+lightmap, in nits, so that Cycles and Eevee show them at once; their Principled BSDF stays, for what they reflect as metal or
 let through. Lamps that are in the lightmaps are gone; the empties in their places have them as the property bakedLight.
 """
 
@@ -154,13 +154,16 @@ class LitMaterial:
 def part_sides():
     """Front and back of a sheet are two meshes in one place, each seen from its own side. Cycles would miss one of them
     behind the other's back, so that all are moved a little outwards."""
-    points = corners()
-    size = max((abs(value) for point in points for value in point), default=1.0)
-    for mesh in {thing.data for thing in bpy.context.scene.objects if thing.type == "MESH"}:
-        user = next(thing for thing in bpy.context.scene.objects if thing.data == mesh)
+    size = max((abs(value) for point in corners() for value in point), default=1.0)
+    users = {thing.data: thing for thing in bpy.context.scene.objects if thing.type == "MESH"}
+    for mesh, user in users.items():
         step = 1e-5 * size / max(max(user.matrix_world.to_scale()), 1e-12)
-        for vertex in mesh.vertices:
-            vertex.co += step * vertex.normal
+        # All at once: a vertex that is moved by itself makes Blender find the normals of the whole mesh anew.
+        points, normals = (numpy.empty(3 * len(mesh.vertices), numpy.float32) for _ in range(2))
+        mesh.vertices.foreach_get("co", points)
+        mesh.vertices.foreach_get("normal", normals)
+        mesh.vertices.foreach_set("co", points + numpy.float32(step) * normals)
+        mesh.update()
 
 
 def load_page(page):
@@ -212,7 +215,7 @@ def main():
     images = [load_page(page) for page in about["lightmaps"]]
     for material in bpy.data.materials:
         page = material.get("lightmap", -1)
-        if 0 <= page < len(images):
+        if isinstance(page, int) and 0 <= page < len(images):
             LitMaterial(material, images[page], about["lightmaps"][page]["luxOfOne"]).light()
     bpy.context.view_layer.update()
     part_sides()

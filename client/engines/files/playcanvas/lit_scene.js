@@ -1,5 +1,5 @@
 // Loads the scene of this folder with its lightmaps. For your own page: copy this file, scene.glb, lighting.json and
-// the lightmaps, and call loadLitScene(). Made with PlayCanvas 2.
+// the lightmaps, and call loadLitScene(). Tested with PlayCanvas 2.23.
 import { ADDRESS_CLAMP_TO_EDGE, Asset, FILTER_LINEAR } from 'playcanvas';
 
 function load(app, asset) {
@@ -22,14 +22,17 @@ async function loadLightMap(app, { file }, folder) {
  * Returns the scene's entity, which is not yet in the hierarchy, and the `exposure` for app.scene. PlayCanvas
  * multiplies a lightMap by the surface's colour, without a division by pi, and has no factor for it. So luminances come
  * in units of luxOfOne / pi nits, and emission is brought to these. Lamps that are in the lightmaps are not in the
- * scene. Lights that you add shine in addition.
+ * scene. Lights that you add shine in addition. Glass shows what is behind it only to cameras that were told to keep
+ * that: camera.requestSceneColorMap(true).
  *
  * @param app a pc.Application, or a pc.AppBase that has the handlers of textures and containers
- * @param {string} folder where the files are
+ * @param {string} folder URL of the folder with the files; unless stated, that of this script
  */
-export async function loadLitScene(app, folder = import.meta.url) {
-  const base = new URL(folder, document.baseURI);
-  const about = await (await fetch(new URL('lighting.json', base))).json();
+export async function loadLitScene(app, folder = new URL('.', import.meta.url).href) {
+  const base = new URL(folder.replace(/\/?$/, '/'), document.baseURI);
+  const answer = await fetch(new URL('lighting.json', base));
+  if (!answer.ok) throw new Error(`${answer.url}: ${answer.status} ${answer.statusText}`);
+  const about = await answer.json();
   const lightMaps = await Promise.all(about.lightmaps.map((page) => loadLightMap(app, page, base)));
   const luxOfOne = about.lightmaps[0]?.luxOfOne ?? 1; // all pages share it
   const postprocess = (gltf, material) => {

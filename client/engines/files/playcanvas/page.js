@@ -46,6 +46,7 @@ function addCamera(app, entity) {
     farClip: 20 * radius,
     toneMapping: TONEMAP_NEUTRAL,
   });
+  camera.camera.requestSceneColorMap(true); // what is seen through glass
   const given = entity.findComponent('camera');
   const target = center.clone();
   if (given) {

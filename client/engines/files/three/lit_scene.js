@@ -1,5 +1,6 @@
 // Loads the scene of this folder with its lightmaps. For your own page: copy this file, scene.glb, lighting.json and
-// the lightmaps, and call loadLitScene(). Needs three.js r155 or later, where a lightMap is irradiance.
+// the lightmaps, and call loadLitScene(). Tested with
+// three.js r187; before r155 a lightMap was no irradiance.
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
@@ -15,11 +16,13 @@ async function loadLightMap({ file }, folder) {
  * toneMappingExposure to `exposure`, which comes with it. Lamps that are in the lightmaps are not in the scene; their
  * nodes tell what they were in userData.bakedLight. Lights that you add shine in addition.
  *
- * @param {string} folder where the files are
+ * @param {string} folder URL of the folder with the files; unless stated, that of this script
  */
-export async function loadLitScene(folder = import.meta.url) {
-  const base = new URL(folder, document.baseURI);
-  const about = await (await fetch(new URL('lighting.json', base))).json();
+export async function loadLitScene(folder = new URL('.', import.meta.url).href) {
+  const base = new URL(folder.replace(/\/?$/, '/'), document.baseURI);
+  const answer = await fetch(new URL('lighting.json', base));
+  if (!answer.ok) throw new Error(`${answer.url}: ${answer.status} ${answer.statusText}`);
+  const about = await answer.json();
   const [gltf, ...lightMaps] = await Promise.all([
     new GLTFLoader().loadAsync(new URL(about.scene, base).href),
     ...about.lightmaps.map((page) => loadLightMap(page, base)),
