@@ -146,10 +146,11 @@ class FolderWriter {
       if (users_.empty() || !isOfPage(file.name)) names_.push_back(file.name);
     }
     if (!users_.empty())
-      saved_.warnings.push_back(
-          fmt::format("{} in {} {} not what --for {} writes, and stay{}; only the scene and its lightmaps were written",
-                      fmt::join(users_, ", "), request_.folder, users_.size() == 1 ? "is" : "are", engine_.name,
-                      users_.size() == 1 ? "s" : ""));
+      saved_.warnings.push_back(fmt::format(
+          "{} in {} {} not what --for {} writes, and stay{}: only the scene and its lightmaps were written; "
+          "remove what is not yours to get ours",
+          fmt::join(users_, ", "), request_.folder, users_.size() == 1 ? "is" : "are", engine_.name,
+          users_.size() == 1 ? "s" : ""));
     if (auto done = tellNext(display); !done) return tl::unexpected(done.error());
     // Whoever finds it finds the files that it names.
     std::stable_partition(names_.begin(), names_.end(), [](const auto& name) { return name != "lighting.json"; });

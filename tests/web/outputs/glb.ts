@@ -7,7 +7,7 @@ interface Gltf {
   nodes: { camera?: number; translation: number[]; rotation: number[] }[];
   cameras: { perspective: { yfov: number } }[];
   meshes: { primitives: { attributes: Record<string, number>; material: number }[] }[];
-  materials: { name: string; pbrMetallicRoughness: Record<string, unknown> }[];
+  materials: { name: string; pbrMetallicRoughness?: Record<string, unknown>; extensions?: Record<string, unknown> }[];
   accessors: Record<string, unknown>[];
   bufferViews: Record<string, number>[];
   buffers: { byteLength: number }[];
@@ -95,7 +95,7 @@ export function withTexture(scene: string, output: string, materials: readonly s
   const textured = gltf.materials.flatMap(({ name }, i) => (materials.includes(name) ? [i] : []));
   if (textured.length !== materials.length) throw new Error(`${scene} has not all of ${materials.join(', ')}`);
   for (const i of textured)
-    Object.assign(gltf.materials[i]!.pbrMetallicRoughness, {
+    Object.assign(gltf.materials[i]!.pbrMetallicRoughness!, {
       baseColorFactor: [1, 1, 1, 1],
       baseColorTexture: { index: 0 },
     });
@@ -107,6 +107,38 @@ export function withTexture(scene: string, output: string, materials: readonly s
     attributes['TEXCOORD_0'] = gltf.accessors.push(accessor) - 1;
   }
   writeGlb(output, { gltf, bin: Buffer.concat(parts) });
+}
+
+/** Of what withTexture() has made: one of its materials in specular-glossiness with a texture of both, one unlit. */
+export function withOddMaterials(scene: string, output: string, glossy: string, unlit: string): void {
+  const { gltf, bin } = readGlb(scene);
+  const dark = png(4, () => [10, 10, 10]); // a reflectance of 0.3 %
+  const parts = [padded(bin, 0), dark];
+  const bufferView = gltf.bufferViews.push({ buffer: 0, byteOffset: parts[0]!.length, byteLength: dark.length }) - 1;
+  (gltf['images'] as unknown[]).push({ bufferView, mimeType: 'image/png' });
+  (gltf['textures'] as unknown[]).push({ source: 1, sampler: 0 });
+  const named = (wanted: string) => gltf.materials.find(({ name }) => name === wanted)!;
+  delete named(glossy).pbrMetallicRoughness;
+  named(glossy).extensions = {
+    KHR_materials_pbrSpecularGlossiness: { diffuseTexture: { index: 0 }, specularGlossinessTexture: { index: 1 } },
+  };
+  named(unlit).extensions = { KHR_materials_unlit: {} };
+  const used = ['KHR_materials_pbrSpecularGlossiness', 'KHR_materials_unlit'];
+  gltf['extensionsUsed'] = [...((gltf['extensionsUsed'] as string[] | undefined) ?? []), ...used];
+  writeGlb(output, { gltf, bin: Buffer.concat(parts) });
+}
+
+/** The scene with one of its meshes of glass. */
+export function withGlass(scene: string, output: string, mesh: number): void {
+  const { gltf, bin } = readGlb(scene);
+  const glass = {
+    name: 'glass',
+    pbrMetallicRoughness: { metallicFactor: 0, roughnessFactor: 0 },
+    extensions: { KHR_materials_transmission: { transmissionFactor: 1 } },
+  };
+  gltf.meshes[mesh]!.primitives[0]!.material = gltf.materials.push(glass) - 1;
+  gltf['extensionsUsed'] = [...((gltf['extensionsUsed'] as string[] | undefined) ?? []), 'KHR_materials_transmission'];
+  writeGlb(output, { gltf, bin });
 }
 
 /** For a flat piece along two of the axes: these, in steps of two metres. */

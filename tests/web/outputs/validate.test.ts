@@ -3,6 +3,7 @@
 import { readFileSync } from 'node:fs';
 import { basename, join } from 'node:path';
 import { validateBytes } from 'gltf-validator';
+import { withOddMaterials, withTexture } from './glb';
 import { filesBelow, folder, inTurns, SCENES, SHARED, solve } from './solve';
 
 const out = folder();
@@ -59,6 +60,21 @@ it('every scene of our own, lit and unlit', async () => {
   const scenes = filesBelow(SCENES, /\.glb$/);
   expect(scenes.length).toBeGreaterThan(5);
   expect(await faultsOfAll(scenes)).toEqual({});
+});
+
+it('scenes for engines', async () => {
+  const room = join(out, 'room_textured.glb');
+  const odd = join(out, 'room_odd.glb');
+  withTexture(join(SCENES, 'room_small.glb'), room, ['floor', 'red_wall']);
+  withOddMaterials(room, odd, 'floor', 'red_wall');
+  const all: Record<string, Faults> = {};
+  for (const scene of [odd, join(SCENES, 'room_lights.glb'), join(SCENES, 'room_small_shade.glb')]) {
+    const folder = join(out, `three-${basename(scene)}`);
+    await solve(scene, folder, ...QUICK, '--for', 'three');
+    const faults = await faultsOf(join(folder, 'scene.glb'));
+    if (faults.errors.length + faults.cutoffs.length > 0) all[basename(scene)] = faults;
+  }
+  expect(all).toEqual({});
 });
 
 it.skipIf(!SHARED)(
