@@ -4,6 +4,7 @@
 #include <array>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <memory>
 #include <numbers>
 #include <optional>
 
@@ -13,9 +14,12 @@
 #include "server/gpu/picture/view_sky.h"
 #include "server/solver/math/microfacets.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/patches/lights.h"
 #include "server/solver/patches/passing.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/rays/specular_leaves.h"
+#include "server/solver/surface/lamp_glints.h"
+#include "server/solver/surface/tinted_rays.h"
 
 namespace radiosity::engine {
 namespace {
@@ -36,12 +40,15 @@ class MirrorView {
         sides_(solver::makeSides(*scene.patches)),
         mirrors_(solver::SpecularLeaves::find(sides_, scene.materials, scene.patches->surfaces)) {
     if (!mirrors_) return;
-    rays_.emplace(*scene.patches, sides_);
+    glints_ = solver::LampGlints(solver::findLightPolygons(*scene.patches, sides_, scene.materials.emission));
+    rays_ = std::make_shared<const solver::LeafRays>(*scene.patches, sides_);
+    tinted_.emplace(rays_);
     for (const auto& side : sides_) {
       const auto emission = scene.materials.emission.side(side.number);
       const auto reflectance = scene.materials.reflectance.side(side.number);
       for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
         own_.push_back(emission[leaf]);
+        lamps_.push_back(side.gathered ? emission[leaf] : glm::vec3(0.0F));
         reflectance_.push_back(reflectance[leaf]);
         irradiance_.push_back(scene.irradiance[side.first_node + leaf]);
       }
@@ -81,6 +88,8 @@ class MirrorView {
 
   [[nodiscard]] glm::vec3 reflected(const solver::LeafRays::Place& at, std::uint32_t value, const glm::dvec3& direction,
                                     std::uint64_t key) const {
+    const solver::RayEnd met{value, at, direction, key};
+    const auto glint = glm::vec3(glints_.look(*tinted_, *mirrors_, met)) * static_cast<float>(std::numbers::inv_pi);
     const auto reflection =
         solver::reflectByMicrofacets(at.normal, direction, mirrors_->roughness(value), solver::mixKeys(key, 1));
     glm::vec3 part(1.0F);
@@ -89,9 +98,14 @@ class MirrorView {
     solver::LeafRays::Panes panes;
     const auto seen = rays_->see(at, reflection.direction, key, end, nullptr, &panes);
     part *= glm::vec3(panes.tint);
-    if (solver::LeafRays::isSky(seen)) return part * gpu::skyRadiance(scene_.sky, reflection.direction);
-    if (seen == solver::LeafRays::kNothing) return glm::vec3(0.0F);
-    return part * radiosityAt(end, seen) * static_cast<float>(std::numbers::inv_pi);
+    if (solver::LeafRays::isSky(seen)) return glint + part * gpu::skyRadiance(scene_.sky, reflection.direction);
+    if (seen == solver::LeafRays::kNothing) return glint;
+    auto radiosity = radiosityAt(end, seen);
+    if (reflection.count == 1 && lamps_[seen] != glm::vec3(0.0F)) {  // looks at lamps find some of that
+      const double weight = glints_.weightOf(*mirrors_, met, {seen, end, reflection.direction, key}, lamps_[seen]);
+      radiosity -= static_cast<float>(1.0 - weight) * lamps_[seen];
+    }
+    return glint + part * radiosity * static_cast<float>(std::numbers::inv_pi);
   }
 
   [[nodiscard]] glm::vec3 radiosityAt(const solver::LeafRays::Place& place, std::uint32_t value) const {
@@ -125,8 +139,11 @@ class MirrorView {
   glm::dvec3 eye_;
   std::vector<solver::Side> sides_;
   std::shared_ptr<const solver::SpecularLeaves> mirrors_;
-  std::optional<solver::LeafRays> rays_;
-  std::vector<glm::vec3> irradiance_, reflectance_, own_;  ///< by leaf value; `own_`: all but what is reflected
+  std::shared_ptr<const solver::LeafRays> rays_;
+  std::optional<solver::TintedRays> tinted_;  ///< these
+  solver::LampGlints glints_;
+  /// By leaf value; `own_`: all but what is reflected, and `lamps_`: of that what glints are looked for of.
+  std::vector<glm::vec3> irradiance_, reflectance_, own_, lamps_;
 };
 
 }  // namespace
