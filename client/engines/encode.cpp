@@ -3,7 +3,6 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <half.h>
 
@@ -17,29 +16,12 @@
 #include <utility>
 #include <vector>
 
+#include "common/exr_stream.h"
+
 namespace radiosity::engines {
 namespace {
 
 using HalfPixel = std::array<half, 4>;  // R, G, B, 1
-
-/// OpenEXR writes into a growing buffer.
-class MemoryStream : public Imf::OStream {
- public:
-  MemoryStream() : Imf::OStream("lightmap.exr") {}
-  void write(const char* data, int count) override {
-    const std::size_t end = position_ + static_cast<std::size_t>(count);
-    if (end > bytes.size()) bytes.resize(end);
-    std::memcpy(bytes.data() + position_, data, static_cast<std::size_t>(count));
-    position_ = end;
-  }
-  std::uint64_t tellp() override { return position_; }
-  void seekp(std::uint64_t position) override { position_ = position; }
-
-  Bytes bytes;
-
- private:
-  std::size_t position_ = 0;
-};
 
 glm::vec3 sane(const glm::vec3& value) {
   const auto channel = [](float v) { return v > 0.0F && std::isfinite(v) ? v : 0.0F; };
@@ -78,7 +60,7 @@ Result<Bytes> writeExr(const Image& page, const std::vector<HalfPixel>& halves, 
       frame.insert(name, Imf::Slice(Imf::HALF, first + place * static_cast<std::ptrdiff_t>(sizeof(half)),
                                     sizeof(HalfPixel), sizeof(HalfPixel) * static_cast<std::size_t>(page.width)));
     }
-    MemoryStream stream;
+    ExrStream stream;
     {
       Imf::OutputFile file(stream, header);
       file.setFrameBuffer(frame);

@@ -3,18 +3,17 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <glm/common.hpp>
 #include <string>
 #include <vector>
 
+#include "common/exr_stream.h"
 #include "common/parallel.h"
 #include "common/task.h"
 #include "server/scene/document/png.h"
@@ -25,25 +24,6 @@ namespace {
 /// That are compressed between two interruption points: whole blocks of 16, as ZIP_COMPRESSION has them.
 constexpr int kExrRows = 64;
 constexpr std::size_t kPixelsAThread = 20'000;
-
-/// OpenEXR writes into a growing buffer.
-class MemoryStream : public Imf::OStream {
- public:
-  MemoryStream() : Imf::OStream("lightmap.exr") {}
-  void write(const char* data, int count) override {
-    const std::size_t end = position_ + static_cast<std::size_t>(count);
-    if (end > bytes.size()) bytes.resize(end);
-    std::memcpy(bytes.data() + position_, data, static_cast<std::size_t>(count));
-    position_ = end;
-  }
-  std::uint64_t tellp() override { return position_; }
-  void seekp(std::uint64_t position) override { position_ = position; }
-
-  Bytes bytes;
-
- private:
-  std::size_t position_ = 0;
-};
 
 /// Khronos PBR Neutral tone mapper (specification of 2024), for linear sRGB.
 glm::vec3 neutralCurve(glm::vec3 color) {
@@ -102,7 +82,7 @@ Result<Bytes> writeExr(int width, int height, Quantity quantity, const std::vect
       frame.insert(channel.name, Imf::Slice(channel.type, const_cast<char*>(channel.first), channel.stride,
                                             channel.stride * static_cast<std::size_t>(width)));
     }
-    MemoryStream stream;
+    ExrStream stream;
     {
       Imf::OutputFile file(stream, header);
       file.setFrameBuffer(frame);

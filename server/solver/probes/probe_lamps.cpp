@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/parallel.h"
+#include "common/take_first.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/probes/lamp_harmonics.h"
 
@@ -184,21 +185,11 @@ std::vector<ProbeLamps::Group> ProbeLamps::groupsOf(const PlaceLight& light) con
   return groups;
 }
 
-std::optional<ProbeLamps::Column> ProbeLamps::known(std::uint64_t key) {
-  for (auto* columns : {&columns_, &spare_}) {
-    const auto found = std::ranges::find(*columns, key, &Column::key);
-    if (found == columns->end()) continue;
-    auto column = std::move(*found);
-    columns->erase(found);
-    return column;
-  }
-  return std::nullopt;
-}
-
 void ProbeLamps::update(const PlaceLight& light) {
   std::vector<Column> next;
   for (auto& group : groupsOf(light)) {
-    if (auto same = known(group.column.key)) {
+    const auto is_same = [&](const Column& column) { return column.key == group.column.key; };
+    if (auto same = takeFirst({&columns_, &spare_}, is_same)) {
       same->light = group.column.light;
       next.push_back(std::move(*same));
       continue;

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -65,7 +64,6 @@ class ProbeLamps {
   [[nodiscard]] std::size_t mostColumns() const;
   [[nodiscard]] std::size_t mostSpare() const { return mostColumns() / 2; }
   [[nodiscard]] std::vector<Group> groupsOf(const PlaceLight& light) const;
-  [[nodiscard]] std::optional<Column> known(std::uint64_t key);
   void look(const PlaceLight& light, Group& group) const;
   [[nodiscard]] Coefficients lookFrom(const PlaceLight& light, const Group& group, std::size_t probe) const;
 

@@ -9,6 +9,7 @@
 
 #include "common/give_back.h"
 #include "common/parallel.h"
+#include "common/take_first.h"
 #include "server/solver/math/sampling.h"
 
 namespace radiosity::solver {
@@ -51,17 +52,6 @@ const CausticLight::OfLamp* CausticLight::findKnown(std::uint64_t key) const {
   return nullptr;
 }
 
-std::optional<CausticLight::OfLamp> CausticLight::take(std::uint64_t key) {
-  for (auto* lamps : {&known_, &spare_}) {
-    const auto found = std::ranges::find(*lamps, key, &OfLamp::key);
-    if (found == lamps->end()) continue;
-    auto taken = std::move(*found);
-    lamps->erase(found);
-    return taken;
-  }
-  return std::nullopt;
-}
-
 void CausticLight::begin(Lamps lamps, const LeafShading* shading, std::uint32_t leaves) {
   if (is_given_up_) lamps = {};
   if (shading != std::exchange(shading_, shading)) known_.clear(), spare_.clear();
@@ -69,7 +59,7 @@ void CausticLight::begin(Lamps lamps, const LeafShading* shading, std::uint32_t 
   const auto count = lamps.paths ? lamps.paths->lampCount() : 0;
   for (std::size_t i = 0; i < count; ++i) {
     const auto key = lamps.paths->keyOf(i);
-    auto same = take(key);
+    auto same = takeFirst({&known_, &spare_}, [&](const OfLamp& lamp) { return lamp.key == key; });
     // However many other lamps there are by then, that it comes back changes no bit.
     next.push_back(same ? std::move(*same) : OfLamp{key, firstPathsOf(*lamps.paths, i, leaves)});
   }

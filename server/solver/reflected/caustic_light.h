@@ -73,7 +73,6 @@ class CausticLight {
   [[nodiscard]] static std::uint32_t firstPathsOf(const CausticPaths& paths, std::size_t lamp, std::uint32_t leaves);
   [[nodiscard]] std::uint32_t wantedOf(const OfLamp& lamp) const { return lamp.first * times_; }
   [[nodiscard]] const OfLamp* findKnown(std::uint64_t key) const;
-  [[nodiscard]] std::optional<OfLamp> take(std::uint64_t key);
   void keepSpare();
   void followSome(OfLamp& known, const OpenLamp& open);
   [[nodiscard]] Leaves follow(const OpenLamp& open, std::size_t half, std::uint32_t first, std::uint32_t end) const;

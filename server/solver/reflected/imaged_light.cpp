@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/parallel.h"
+#include "common/take_first.h"
 #include "common/task.h"
 #include "server/solver/math/sampling.h"
 
@@ -45,17 +46,6 @@ bool ImagedLight::isKnown(std::uint64_t key) const {
   return std::ranges::any_of(known_, is_it) || std::ranges::any_of(spare_, is_it);
 }
 
-std::optional<ImagedLight::OfImage> ImagedLight::take(std::uint64_t key) {
-  for (auto* images : {&known_, &spare_}) {
-    const auto found = std::ranges::find_if(*images, [&](const OfImage& image) { return isKnown(image, key); });
-    if (found == images->end()) continue;
-    auto taken = std::move(*found);
-    images->erase(found);
-    return taken;
-  }
-  return std::nullopt;
-}
-
 std::uint64_t ImagedLight::looksFor(const Lamps& lamps) const {
   if (!lamps.images || is_given_up_) return 0;
   std::uint64_t leaves = 0, unknown = 0;
@@ -73,7 +63,7 @@ void ImagedLight::begin(Lamps lamps, const LeafShading* shading) {
   std::vector<std::uint32_t> unknown;
   for (std::uint32_t i = 0; lamps.images && i < lamps.images->images().size(); ++i) {
     const auto key = lamps.images->images()[i].key;
-    if (auto same = take(key)) {
+    if (auto same = takeFirst({&known_, &spare_}, [&](const OfImage& one) { return isKnown(one, key); })) {
       next.push_back(std::move(*same));
     } else {
       next.push_back({key, times_, false, {}});

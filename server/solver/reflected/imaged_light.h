@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "server/solver/lamps/lamp_images.h"
@@ -72,7 +71,6 @@ class ImagedLight {
   };
   [[nodiscard]] bool isKnown(const OfImage& image, std::uint64_t key) const;
   [[nodiscard]] bool isKnown(std::uint64_t key) const;
-  [[nodiscard]] std::optional<OfImage> take(std::uint64_t key);
   void plan(std::uint32_t image);
   [[nodiscard]] std::vector<Leaf> look(const Look& look) const;
   void askAgain(const LampImages::Image& image, Leaf& leaf) const;

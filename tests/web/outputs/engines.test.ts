@@ -2,8 +2,6 @@
 
 import { execFileSync } from 'node:child_process';
 import { existsSync, readFileSync } from 'node:fs';
-import { createServer, type Server } from 'node:http';
-import type { AddressInfo } from 'node:net';
 import { extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { FloatType } from 'three';
@@ -12,6 +10,7 @@ import { Pages } from '../browser/harness';
 import { readGlb, withGlass, withOddMaterials, withTexture } from './glb';
 import { compare, expectTheSame, fromBase64, HEIGHT, traced, WIDTH, type Difference } from './pictures';
 import { folder, SCENES, solve } from './solve';
+import { WebServer } from './web_server';
 
 const TYPES: Record<string, string> = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript' };
 const QUALITY = ['--quiet', '--error', '0.01', '--texels', '80000', '--time-limit', '20'];
@@ -19,37 +18,31 @@ const PACKAGES = fileURLToPath(new URL('../../../client/web/', import.meta.url))
 
 const out = folder();
 const pages = new Pages([WIDTH, HEIGHT]);
-let server: Server;
 /** What is served: a folder as it was written, with node_modules as if npm had been run in it. */
 let shown = '';
 
-function fileOf(url: string): string {
-  const path = normalize(decodeURIComponent(url));
+function fileOf(path: string): string {
   if (path.startsWith('/node_modules/')) return join(PACKAGES, path);
   if (path.startsWith('/draw/')) return fileURLToPath(new URL(`.${path}`, import.meta.url));
   return join(shown, path === '/' ? 'index.html' : path);
 }
 
+const server = new WebServer((url) => {
+  const file = fileOf(normalize(decodeURIComponent(url)));
+  return { body: readFileSync(file), type: TYPES[extname(file)] ?? 'application/octet-stream' };
+});
+
 beforeAll(async () => {
-  server = createServer((request, response) => {
-    try {
-      const file = fileOf(request.url ?? '/');
-      const type = TYPES[extname(file)] ?? 'application/octet-stream';
-      response.writeHead(200, { 'Content-Type': type }).end(readFileSync(file));
-    } catch {
-      response.writeHead(404).end();
-    }
-  });
-  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  await server.launch();
   await pages.launch();
 });
 afterAll(async () => {
   await pages.quit();
-  server.close();
+  server.quit();
 });
 
 async function openPage() {
-  const page = await pages.open(`http://127.0.0.1:${(server.address() as AddressInfo).port}/`);
+  const page = await pages.open(server.url);
   await page.waitForFunction(() => !document.getElementById('note'));
   return page;
 }

@@ -1,50 +1,43 @@
 // What a user sees who puts the lightmap on the lit scene in three.js is what a path tracer says is there.
 
 import { readFileSync } from 'node:fs';
-import { createServer, type Server } from 'node:http';
-import type { AddressInfo } from 'node:net';
 import { basename, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { Pages } from '../browser/harness';
 import { withTexture } from './glb';
 import { compare, expectTheSame, fromBase64, HEIGHT, traced, WIDTH, type Difference } from './pictures';
 import { filesBelow, folder, SCENES, solve } from './solve';
+import { WebServer, type Served } from './web_server';
 
 const out = folder();
 const pages = new Pages();
-let server: Server;
 
 /** three.js as npm brings it, the stage, and what was solved. */
-function serve(url: string): { body: Buffer; type: string } {
+function serve(url: string): Served {
   const path = normalize(decodeURIComponent(url));
   const here = (name: string) => fileURLToPath(new URL(name, import.meta.url));
   if (path === '/') return { body: readFileSync(here('stage.html')), type: 'text/html' };
   if (path.startsWith('/three/'))
     return { body: readFileSync(here(`../../../client/web/node_modules${path}`)), type: 'text/javascript' };
+  if (path.startsWith('/draw/')) return { body: readFileSync(here(`.${path}`)), type: 'text/javascript' };
   return { body: readFileSync(join(out, basename(path))), type: 'application/octet-stream' };
 }
 
+const server = new WebServer(serve);
+
 beforeAll(async () => {
-  server = createServer((request, response) => {
-    try {
-      const { body, type } = serve(request.url ?? '/');
-      response.writeHead(200, { 'Content-Type': type }).end(body);
-    } catch {
-      response.writeHead(404).end();
-    }
-  });
-  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  await server.launch();
   await pages.launch();
 });
 afterAll(async () => {
   await pages.quit();
-  server.close();
+  server.quit();
 });
 
 /** R, G, B of each pixel, rows from the top. Without a kind of material: the file alone, as it is. */
 async function drawn(name: string, kind?: string): Promise<Float32Array> {
   const maps = kind ? filesBelow(out, new RegExp(`^${name}-lit\\.lightmap\\.\\d+\\.exr$`)) : [];
-  const page = await pages.open(`http://127.0.0.1:${(server.address() as AddressInfo).port}/`);
+  const page = await pages.open(server.url);
   await page.waitForFunction(() => 'draw' in window);
   const what = {
     lit: `/${name}-lit.glb`,
